@@ -1,0 +1,3 @@
+//! `quest-cli`: candidate poses from matched points.
+
+fn main() {}

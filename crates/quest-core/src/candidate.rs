@@ -1,0 +1,157 @@
+//! What every solver returns: a short list of poses.
+
+use std::ops::Deref;
+
+use crate::{Correspondence, RelativePose};
+
+/// Where a candidate comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CandidateKind {
+    /// A real solution of the constraints (a local minimum of their squares for more than five matches).
+    Exact,
+    /// The real part of a complex solution. Under noise the true pose often hides in one.
+    FromComplex,
+    /// The rotation that best aligns the bearings, as if there were no translation.
+    RotationOnly,
+}
+
+impl CandidateKind {
+    /// The name in files: `exact`, `from_complex`, `rotation_only`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::FromComplex => "from_complex",
+            Self::RotationOnly => "rotation_only",
+        }
+    }
+}
+
+/// Why the matches do not determine a pose, or determine only a part of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Degeneracy {
+    /// Fewer matches than the solver needs.
+    TooFewMatches,
+    /// All points coincide in one view.
+    Coincident,
+    /// Matches are repeated, and too few distinct ones are left.
+    Duplicate,
+    /// Four or more of five points lie on a line.
+    Collinear,
+    /// The matches give fewer than five independent constraints, for another reason than those above.
+    RankDeficient,
+    /// A rotation alone explains the matches to the last digit: there is no translation, and no depth is
+    /// determined. The candidate holds the rotation and `t = 0`.
+    PureRotation,
+}
+
+impl Degeneracy {
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TooFewMatches => "too_few_matches",
+            Self::Coincident => "coincident",
+            Self::Duplicate => "duplicate",
+            Self::Collinear => "collinear",
+            Self::RankDeficient => "rank_deficient",
+            Self::PureRotation => "pure_rotation",
+        }
+    }
+}
+
+/// One pose that may be the true one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Where it comes from.
+    pub kind: CandidateKind,
+    /// The pose. The mean absolute depth over both views is 1, so `|t_21|` is the parallax of (63).
+    pub pose: RelativePose,
+    /// Root mean square over the matches, in radians, of the angle by which each bearing of a match would
+    /// have to turn to satisfy the epipolar constraint (the Sampson error on the sphere).
+    pub residual: f64,
+    /// How many of the matches have positive depth in both views.
+    pub in_front: usize,
+}
+
+impl Candidate {
+    /// The depths of a match at this pose; see [`RelativePose::depths`].
+    #[must_use]
+    pub fn depths(&self, m: &Correspondence) -> Option<(f64, f64)> {
+        self.pose.depths(m)
+    }
+}
+
+/// The candidates of one solve, best first: most points in front, then the smallest residual.
+///
+/// Holds at most [`Candidates::CAPACITY`] and never allocates. Dereferences to a slice.
+#[derive(Clone, Debug)]
+pub struct Candidates {
+    items: [Candidate; Self::CAPACITY],
+    len: usize,
+    degeneracy: Option<Degeneracy>,
+}
+
+impl Candidates {
+    /// Twenty rotations solve the five-point problem; the rotation-only candidate and a few of a special
+    /// kind (the motions of a homography) come on top.
+    pub const CAPACITY: usize = 24;
+
+    /// An empty list.
+    #[must_use]
+    pub fn new() -> Self {
+        let none = Candidate {
+            kind: CandidateKind::Exact,
+            pose: RelativePose::identity(),
+            residual: f64::INFINITY,
+            in_front: 0,
+        };
+        Self { items: [none; Self::CAPACITY], len: 0, degeneracy: None }
+    }
+
+    /// Empties the list.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.degeneracy = None;
+    }
+
+    /// Appends a candidate; one that no longer fits is dropped.
+    pub fn push(&mut self, candidate: Candidate) {
+        if self.len < Self::CAPACITY {
+            self.items[self.len] = candidate;
+            self.len += 1;
+        }
+    }
+
+    /// What kept the matches from determining a pose, if anything did.
+    #[must_use]
+    pub fn degeneracy(&self) -> Option<Degeneracy> {
+        self.degeneracy
+    }
+
+    /// Records why there is no pose, or only a part of one.
+    pub fn set_degeneracy(&mut self, degeneracy: Degeneracy) {
+        self.degeneracy = Some(degeneracy);
+    }
+
+    /// The candidates that can be changed in place.
+    pub fn as_mut_slice(&mut self) -> &mut [Candidate] {
+        &mut self.items[..self.len]
+    }
+}
+
+impl Default for Candidates {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Deref for Candidates {
+    type Target = [Candidate];
+
+    fn deref(&self) -> &[Candidate] {
+        &self.items[..self.len]
+    }
+}

@@ -1,0 +1,218 @@
+//! Matched points as pairs of bearings, checked once at the door.
+
+use nalgebra::Vector3;
+
+use crate::{Camera, CameraError};
+
+/// Coordinates on the plane `z = 1` beyond this are refused: the viewing ray can no longer be told from one
+/// at a right angle to the optical axis (`1 / sqrt(f64::EPSILON)`).
+pub const MAX_IMAGE_COORDINATE: f64 = 6.7e7;
+
+/// One match: the viewing rays of the same point in camera 1 and in camera 2.
+///
+/// The rays are kept as unit bearings together with the lengths of the vectors they were given as, so that
+/// depths are reported for the vectors as given: for points on the plane `z = 1` a depth is the z coordinate
+/// of the point, as in the paper; for unit bearings it is the distance along the ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correspondence {
+    bearing1: Vector3<f64>,
+    bearing2: Vector3<f64>,
+    length1: f64,
+    length2: f64,
+}
+
+/// Why a match was refused. The view is 1 or 2.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MatchError {
+    /// A coordinate is NaN or infinite.
+    #[error("a coordinate in view {view} is {value}, expected a finite number")]
+    NotFinite {
+        /// 1 or 2.
+        view: u8,
+        /// What was found.
+        value: f64,
+    },
+    /// A point lies too far from the optical axis to have a bearing.
+    #[error(
+        "a coordinate in view {view} is {value:e} on the plane z = 1, expected at most {MAX_IMAGE_COORDINATE:e}"
+    )]
+    TooFar {
+        /// 1 or 2.
+        view: u8,
+        /// What was found.
+        value: f64,
+    },
+    /// A bearing has no direction: its length is zero, or too small or large to be squared.
+    #[error("a bearing in view {view} has the length {length:e}, expected between 1e-150 and 1e150")]
+    NoDirection {
+        /// 1 or 2.
+        view: u8,
+        /// What was found.
+        length: f64,
+    },
+    /// The camera has no viewing ray for the pixel.
+    #[error("view {view}: {source}")]
+    Camera {
+        /// 1 or 2.
+        view: u8,
+        /// What the camera says.
+        source: CameraError,
+    },
+}
+
+/// Why a set of matches was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// One match is unusable.
+    #[error("match {index}: {source}")]
+    Match {
+        /// Counted from zero.
+        index: usize,
+        /// What is wrong with it.
+        source: MatchError,
+    },
+    /// The two views do not have the same number of points.
+    #[error("view 1 has {first} points and view 2 has {second}, expected as many")]
+    LengthMismatch {
+        /// Points in view 1.
+        first: usize,
+        /// Points in view 2.
+        second: usize,
+    },
+    /// There are fewer matches than the solver needs.
+    #[error("found {found} matches, expected at least {needed}")]
+    TooFewMatches {
+        /// How many there are.
+        found: usize,
+        /// How many the solver needs.
+        needed: usize,
+    },
+}
+
+impl Correspondence {
+    /// A match of two bearings of any length, in the frames of camera 1 and camera 2.
+    ///
+    /// # Errors
+    /// [`MatchError::NotFinite`] and [`MatchError::NoDirection`].
+    pub fn from_bearings(x1: [f64; 3], x2: [f64; 3]) -> Result<Self, MatchError> {
+        let (bearing1, length1) = unit(1, x1)?;
+        let (bearing2, length2) = unit(2, x2)?;
+        Ok(Self { bearing1, bearing2, length1, length2 })
+    }
+
+    /// A match of two points on the planes `z = 1` of the cameras (normalised image coordinates).
+    ///
+    /// # Errors
+    /// [`MatchError::NotFinite`] and [`MatchError::TooFar`].
+    pub fn from_image_points(x1: [f64; 2], x2: [f64; 2]) -> Result<Self, MatchError> {
+        for (view, x) in [(1, x1), (2, x2)] {
+            for value in x {
+                if value.abs() > MAX_IMAGE_COORDINATE && value.is_finite() {
+                    return Err(MatchError::TooFar { view, value });
+                }
+            }
+        }
+        Self::from_bearings([x1[0], x1[1], 1.0], [x2[0], x2[1], 1.0])
+    }
+
+    /// A match of two pixels.
+    ///
+    /// # Errors
+    /// As [`Correspondence::from_bearings`], and [`MatchError::Camera`] where a camera has no ray for its pixel.
+    pub fn from_pixels(
+        camera1: &Camera,
+        u1: [f64; 2],
+        camera2: &Camera,
+        u2: [f64; 2],
+    ) -> Result<Self, MatchError> {
+        let ray = |view, camera: &Camera, u| {
+            camera.bearing(u).map_err(|source| MatchError::Camera { view, source })
+        };
+        Self::from_bearings(ray(1, camera1, u1)?.into(), ray(2, camera2, u2)?.into())
+    }
+
+    /// The unit bearing in the frame of camera 1.
+    #[must_use]
+    #[inline]
+    pub fn bearing1(&self) -> &Vector3<f64> {
+        &self.bearing1
+    }
+
+    /// The unit bearing in the frame of camera 2.
+    #[must_use]
+    #[inline]
+    pub fn bearing2(&self) -> &Vector3<f64> {
+        &self.bearing2
+    }
+
+    /// The length of the vector given for camera 1.
+    #[must_use]
+    #[inline]
+    pub fn length1(&self) -> f64 {
+        self.length1
+    }
+
+    /// The length of the vector given for camera 2.
+    #[must_use]
+    #[inline]
+    pub fn length2(&self) -> f64 {
+        self.length2
+    }
+}
+
+fn unit(view: u8, x: [f64; 3]) -> Result<(Vector3<f64>, f64), MatchError> {
+    if let Some(&value) = x.iter().find(|v| !v.is_finite()) {
+        return Err(MatchError::NotFinite { view, value });
+    }
+    let x = Vector3::from(x);
+    let largest = x.amax();
+    // Between these bounds the squared length neither overflows nor underflows.
+    if !(1e-150..=1e150).contains(&largest) {
+        return Err(MatchError::NoDirection { view, length: largest });
+    }
+    let length = x.norm();
+    Ok((x / length, length))
+}
+
+/// Matches from points on the planes `z = 1`, one `[x, y]` a match and view.
+///
+/// # Errors
+/// [`InputError::LengthMismatch`], and [`InputError::Match`] for the first match that is refused.
+pub fn from_image_points(x1: &[[f64; 2]], x2: &[[f64; 2]]) -> Result<Vec<Correspondence>, InputError> {
+    collect(x1, x2, Correspondence::from_image_points)
+}
+
+/// Matches from bearings of any length, one `[x, y, z]` a match and view.
+///
+/// # Errors
+/// [`InputError::LengthMismatch`], and [`InputError::Match`] for the first match that is refused.
+pub fn from_bearings(x1: &[[f64; 3]], x2: &[[f64; 3]]) -> Result<Vec<Correspondence>, InputError> {
+    collect(x1, x2, Correspondence::from_bearings)
+}
+
+/// Matches from pixels of two cameras, one `[u, v]` a match and view.
+///
+/// # Errors
+/// [`InputError::LengthMismatch`], and [`InputError::Match`] for the first match that is refused.
+pub fn from_pixels(
+    camera1: &Camera,
+    u1: &[[f64; 2]],
+    camera2: &Camera,
+    u2: &[[f64; 2]],
+) -> Result<Vec<Correspondence>, InputError> {
+    collect(u1, u2, |a, b| Correspondence::from_pixels(camera1, a, camera2, b))
+}
+
+fn collect<const D: usize>(
+    x1: &[[f64; D]],
+    x2: &[[f64; D]],
+    one: impl Fn([f64; D], [f64; D]) -> Result<Correspondence, MatchError>,
+) -> Result<Vec<Correspondence>, InputError> {
+    if x1.len() != x2.len() {
+        return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
+    }
+    let pairs = x1.iter().zip(x2).enumerate();
+    pairs.map(|(index, (&a, &b))| one(a, b).map_err(|source| InputError::Match { index, source })).collect()
+}

@@ -1,0 +1,94 @@
+//! The pose of one camera relative to another.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::Correspondence;
+
+/// Camera 2 relative to camera 1: `X2 = R_21 X1 + t_21` (section 5 of the paper, figure 2).
+///
+/// `t_21` shares its scale with the depths; see [`crate::Candidate::depths`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativePose {
+    /// The rotation as a unit quaternion; [`wxyz`](Self::wxyz) gives it scalar first.
+    pub q_21: UnitQuaternion<f64>,
+    /// The translation: the origin of camera 1 in the coordinates of camera 2.
+    pub t_21: Vector3<f64>,
+}
+
+impl RelativePose {
+    /// The pose with rotation `q_21` and translation `t_21`.
+    #[must_use]
+    pub fn new(q_21: UnitQuaternion<f64>, t_21: Vector3<f64>) -> Self {
+        Self { q_21, t_21 }
+    }
+
+    /// No rotation and no translation.
+    #[must_use]
+    pub fn identity() -> Self {
+        Self { q_21: UnitQuaternion::identity(), t_21: Vector3::zeros() }
+    }
+
+    /// The rotation matrix `R_21`, equation (3).
+    #[must_use]
+    pub fn r_21(&self) -> Matrix3<f64> {
+        self.q_21.to_rotation_matrix().into_inner()
+    }
+
+    /// The quaternion scalar first, `(q1, q2, q3, q4)` of the paper, with `q1 >= 0`.
+    #[must_use]
+    pub fn wxyz(&self) -> [f64; 4] {
+        let q = self.q_21.quaternion();
+        let s = if q.w < 0.0 { -1.0 } else { 1.0 };
+        [s * q.w, s * q.i, s * q.j, s * q.k]
+    }
+
+    /// The pose of camera 1 relative to camera 2: `X1 = R_12 X2 + t_12`.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let q_12 = self.q_21.inverse();
+        Self { q_21: q_12, t_21: -(q_12 * self.t_21) }
+    }
+
+    /// The angle in radians of the rotation that takes this pose's rotation to `other`'s, in `[0, π]`.
+    ///
+    /// Twice the metric (61) of the paper, and exact for small angles.
+    #[must_use]
+    pub fn rotation_error(&self, other: &Self) -> f64 {
+        let d = self.q_21.inverse() * other.q_21;
+        2.0 * d.imag().norm().atan2(d.w.abs())
+    }
+
+    /// The angle in radians between the two translations, in `[0, π]`, or `None` where one of them vanishes.
+    ///
+    /// Signed, unlike the metric (62) of the paper.
+    #[must_use]
+    pub fn translation_error(&self, other: &Self) -> Option<f64> {
+        let (a, b) = (self.t_21.try_normalize(0.0)?, other.t_21.try_normalize(0.0)?);
+        Some(a.cross(&b).norm().atan2(a.dot(&b)))
+    }
+
+    /// The essential matrix `[t_21]× R_21`, with `x2ᵀ E x1 = 0`.
+    #[must_use]
+    pub fn essential(&self) -> Matrix3<f64> {
+        self.t_21.cross_matrix() * self.r_21()
+    }
+
+    /// The depths `(z1, z2)` of a match, in the unit of `t_21`: `z1 R x1 + t = z2 x2`, equation (28), in the
+    /// least-squares sense where the two rays do not meet.
+    ///
+    /// Depths multiply the vectors as they were given to [`Correspondence`]. `None` where the rays are
+    /// parallel, so that no depth is determined.
+    #[must_use]
+    pub fn depths(&self, m: &Correspondence) -> Option<(f64, f64)> {
+        let c = self.q_21 * m.bearing1();
+        let n = m.bearing2().cross(&c);
+        let nn = n.norm_squared();
+        // Below the rounding of the cross product itself the direction of n is noise.
+        if nn <= f64::EPSILON * f64::EPSILON {
+            return None;
+        }
+        let range1 = -m.bearing2().cross(&self.t_21).dot(&n) / nn;
+        let range2 = -c.cross(&self.t_21).dot(&n) / nn;
+        Some((range1 / m.length1(), range2 / m.length2()))
+    }
+}

@@ -1,0 +1,100 @@
+//! The pose solvers, one file each, behind one small trait.
+
+mod quest_eigen;
+
+use std::str::FromStr;
+
+pub use quest_eigen::QuestEigen;
+
+use crate::{Candidates, Correspondence};
+
+/// Which candidates a solver returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kinds {
+    /// Every kind: real solutions, real parts of complex ones, and the rotation-only candidate.
+    #[default]
+    All,
+    /// The real solutions alone.
+    Exact,
+}
+
+/// A solver: candidate poses from matches.
+pub trait PoseSolver {
+    /// The name on the command line and in files.
+    const NAME: &'static str;
+    /// The smallest number of matches it works with.
+    const MIN_MATCHES: usize;
+
+    /// Fills `out` with the candidates, best first. With no pose to be found `out` is left empty and says
+    /// why in [`Candidates::degeneracy`].
+    fn solve(&self, matches: &[Correspondence], out: &mut Candidates);
+}
+
+/// A solver chosen at run time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SolverName {
+    /// [`QuestEigen`].
+    QuestEigen,
+}
+
+/// What the table of solvers says of one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SolverInfo {
+    /// The name on the command line and in files.
+    pub name: &'static str,
+    /// The smallest number of matches.
+    pub min_matches: usize,
+    /// The largest number of candidates, of all kinds.
+    pub max_candidates: usize,
+    /// Where the method was published.
+    pub reference: &'static str,
+}
+
+/// No solver has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no solver {found:?}, expected one of {}", SolverName::ALL.map(|s| s.info().name).join(", "))]
+pub struct UnknownSolver {
+    /// The name that was asked for.
+    pub found: String,
+}
+
+impl SolverName {
+    /// Every solver, in the order of the table; the first is the default.
+    pub const ALL: [Self; 1] = [Self::QuestEigen];
+
+    /// The table's row.
+    #[must_use]
+    pub fn info(self) -> SolverInfo {
+        match self {
+            Self::QuestEigen => SolverInfo {
+                name: QuestEigen::NAME,
+                min_matches: QuestEigen::MIN_MATCHES,
+                max_candidates: 21,
+                reference: "Fathian et al., RAS 2018, section 7.1",
+            },
+        }
+    }
+
+    /// Solves with this solver; see [`PoseSolver::solve`].
+    pub fn solve(self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
+        match self {
+            Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+        }
+    }
+}
+
+impl Default for SolverName {
+    fn default() -> Self {
+        Self::ALL[0]
+    }
+}
+
+impl FromStr for SolverName {
+    type Err = UnknownSolver;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSolver> {
+        let found = Self::ALL.into_iter().find(|s| s.info().name == name);
+        found.ok_or_else(|| UnknownSolver { found: name.to_owned() })
+    }
+}
