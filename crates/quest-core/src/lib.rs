@@ -21,10 +21,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod algebra;
 pub mod camera;
 pub mod candidate;
 pub mod correspondence;
 pub mod pose;
+pub mod quaternion;
 pub mod solver;
 
 pub use camera::{Camera, CameraError, CameraModel};
