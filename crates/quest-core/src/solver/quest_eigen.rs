@@ -243,7 +243,7 @@ impl Spectrum {
             return None;
         };
         let q = g.inverse() * UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-        q.coords.iter().all(|c| c.is_finite()).then_some((kind, q))
+        q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
     }
 
     /// Adds the solution of every eigenvalue. Whether all of the real ones were found.
