@@ -50,6 +50,8 @@ mod distortion;
 mod error;
 mod model;
 mod root;
+#[cfg(test)]
+mod tests;
 
 use std::f64::consts::PI;
 
