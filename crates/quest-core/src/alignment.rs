@@ -13,21 +13,49 @@ use crate::quaternion::{bilinear, from_wxyz};
 /// bearings equally well (all of them parallel) it is one of these.
 #[must_use]
 pub fn best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
-    let sum: Matrix3<f64> = matches.iter().map(|m| m.bearing2() * m.bearing1().transpose()).sum();
+    align(matches, |_| 1.0)
+}
+
+/// The rotation that best aligns the bearings as lines, where that may differ from [`best_rotation`]: the bearings of points
+/// behind a camera are opposite if their image points were taken as if in front. `None` for ordinary matches.
+///
+/// A rotation preserves the angles between bearings, so that those to the first one tell all signs but a common one, and
+/// it preserves orientation: with the signs right, `Σ b aᵀ` is near `R Σ a aᵀ`, of positive determinant.
+pub(crate) fn best_rotation_of_lines(matches: &[Correspondence]) -> Option<UnitQuaternion<f64>> {
+    let first = matches.first()?;
+    let sign = |m: &Correspondence| {
+        1.0_f64.copysign(first.bearing1().dot(m.bearing1()) * first.bearing2().dot(m.bearing2()))
+    };
+    let turned = matches.iter().any(|m| sign(m) < 0.0);
+    let common = 1.0_f64.copysign(outer_sum(matches, sign).determinant());
+    (turned || common < 0.0).then(|| align(matches, |m| common * sign(m)))
+}
+
+/// `Σ b aᵀ`, with signs.
+fn outer_sum(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> Matrix3<f64> {
+    matches.iter().map(|m| m.bearing2() * (m.bearing1() * sign(m)).transpose()).sum()
+}
+
+fn align(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> UnitQuaternion<f64> {
+    let sum = outer_sum(matches, &sign);
     let below = -(matches.len() as f64);
     match smallest_eigenvector_4(&bilinear(&sum), below) {
-        Some(q) => polished(UnitQuaternion::new_normalize(from_wxyz(&q)), matches),
+        Some(q) => polished(UnitQuaternion::new_normalize(from_wxyz(&q)), matches, sign),
         None => UnitQuaternion::identity(),
     }
 }
 
 /// One Gauss–Newton step on `Σ |b − R a|²`. The eigenvector squares the condition of the problem, which shows where the
 /// bearings nearly lie in a line; the residuals do not.
-fn polished(q_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> UnitQuaternion<f64> {
+fn polished(
+    q_21: UnitQuaternion<f64>,
+    matches: &[Correspondence],
+    sign: impl Fn(&Correspondence) -> f64,
+) -> UnitQuaternion<f64> {
     let r_21 = q_21.to_rotation_matrix();
     let (mut hessian, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
     for m in matches {
-        let c = r_21 * m.bearing1();
+        let c = r_21 * m.bearing1() * sign(m);
         hessian += Matrix3::from_diagonal_element(c.norm_squared()) - c * c.transpose();
         gradient += c.cross(&(m.bearing2() - c));
     }

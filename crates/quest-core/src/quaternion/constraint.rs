@@ -115,8 +115,9 @@ pub fn constraint_matrix(matches: &[Correspondence]) -> Result<Vec<[f64; 35]>, I
 
 #[cfg(test)]
 mod tests {
-    use super::super::monomials::{MONOMIALS, evaluate};
+    use super::super::monomials::MONOMIALS;
     use super::*;
+    use crate::algebra::monomials::evaluate;
     use nalgebra::{Matrix3, Quaternion};
 
     /// Example 3 of the paper as far as its printed points allow.

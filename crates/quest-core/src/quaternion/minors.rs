@@ -68,10 +68,11 @@ pub(crate) fn minors_with_q(m: &[Matrix4<f64>; 5]) -> [Quartic; 10] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::monomials::{MONOMIALS, evaluate};
+    use super::super::monomials::MONOMIALS;
     use super::super::{bilinear, ten_quartics};
     use super::*;
     use crate::Correspondence;
+    use crate::algebra::monomials::evaluate;
     use nalgebra::{SMatrix, Vector4};
 
     fn five() -> [Correspondence; 5] {

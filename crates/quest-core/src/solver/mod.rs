@@ -1,12 +1,16 @@
 //! The pose solvers, one file each, behind one small trait.
 
-mod constraints;
+mod aligned;
+mod cubics;
+mod essential;
 mod motion;
+mod quest;
 mod quest_eigen;
 mod shortlist;
 
 use std::str::FromStr;
 
+pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
 
 use crate::{Candidates, Correspondence};
@@ -37,6 +41,8 @@ pub trait PoseSolver {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SolverName {
+    /// [`Quest`].
+    Quest,
     /// [`QuestEigen`].
     QuestEigen,
 }
@@ -64,12 +70,18 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 1] = [Self::QuestEigen];
+    pub const ALL: [Self; 2] = [Self::Quest, Self::QuestEigen];
 
     /// The table's row.
     #[must_use]
     pub fn info(self) -> SolverInfo {
         match self {
+            Self::Quest => SolverInfo {
+                name: Quest::NAME,
+                min_matches: Quest::MIN_MATCHES,
+                max_candidates: 21,
+                reference: "this project; elimination of Nistér, PAMI 2004",
+            },
             Self::QuestEigen => SolverInfo {
                 name: QuestEigen::NAME,
                 min_matches: QuestEigen::MIN_MATCHES,
@@ -82,6 +94,7 @@ impl SolverName {
     /// Solves with this solver; see [`PoseSolver::solve`].
     pub fn solve(self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
         match self {
+            Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
         }
     }

@@ -7,14 +7,17 @@
 //! dr = ω · (c × (t × b)) + δ1 n · e1 + δ2 n · e2,   n = b × c
 //! ```
 
-use nalgebra::{Matrix5, SMatrix, UnitQuaternion, Vector3, Vector5};
+use nalgebra::{Matrix3, Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 
-use super::constraints::Gram;
+use super::aligned::{Alignment, Gram};
 use crate::Correspondence;
 use crate::algebra::elimination;
 
 /// A step shorter than this (radians) is rounding.
 const CONVERGED: f64 = 1e-13;
+
+/// Newton's iteration takes one or two; a double root takes them all.
+const MAX_NEWTON_STEPS: usize = 10;
 
 /// A relative pose without the length of its translation.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +40,7 @@ pub(crate) enum Outcome {
 impl Motion {
     /// The other rotation with the same essential matrix: turned by 180° about the translation, `q' = t ⊗ q`.
     pub(crate) fn twisted(&self) -> Self {
-        let q = nalgebra::Quaternion::from_imag(self.direction) * self.q_21.into_inner();
+        let q = Quaternion::from_imag(self.direction) * self.q_21.into_inner();
         Self { q_21: UnitQuaternion::new_normalize(q), direction: self.direction }
     }
 
@@ -49,18 +52,35 @@ impl Motion {
             && (1.0 - cosine) < 0.125 * tolerance * tolerance + 4.0 * f64::EPSILON
     }
 
+    /// The essential matrix `[t]× R`.
+    pub(crate) fn essential(&self) -> Matrix3<f64> {
+        self.direction.cross_matrix() * self.q_21.to_rotation_matrix().into_inner()
+    }
+
+    /// The derivatives of the essential matrix by the five parameters.
+    pub(crate) fn essential_derivatives(&self, tangent: &[Vector3<f64>; 2]) -> [Matrix3<f64>; 5] {
+        let r_21 = self.q_21.to_rotation_matrix().into_inner();
+        let cross = self.direction.cross_matrix();
+        std::array::from_fn(|k| match k {
+            0..3 => cross * Vector3::ith(k, 1.0).cross_matrix() * r_21,
+            _ => tangent[k - 3].cross_matrix() * r_21,
+        })
+    }
+
     fn moved(&self, tangent: &[Vector3<f64>; 2], step: &[f64; 5]) -> Self {
-        let turn = UnitQuaternion::new(Vector3::new(step[0], step[1], step[2]));
+        // To first order a rotation by ω; any step of the iteration may differ from it to second order.
+        let turn = Quaternion::new(1.0, 0.5 * step[0], 0.5 * step[1], 0.5 * step[2]);
         let direction = self.direction + tangent[0] * step[3] + tangent[1] * step[4];
         Self {
-            q_21: UnitQuaternion::new_normalize((turn * self.q_21).into_inner()),
+            q_21: UnitQuaternion::new_normalize(turn * self.q_21.into_inner()),
             direction: direction.normalize(),
         }
     }
 
     /// Newton's iteration to the solution of five constraints.
-    pub(crate) fn solve_five(&mut self, matches: &[Correspondence; 5], max_steps: usize) -> Outcome {
-        for _ in 0..max_steps {
+    pub(crate) fn solve_five(&mut self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Outcome {
+        let resolution = alignment.direction_resolution();
+        for _ in 0..MAX_NEWTON_STEPS {
             let tangent = tangent_basis(&self.direction);
             let r_21 = self.q_21.to_rotation_matrix();
             let (mut jacobian, mut step) = ([[0.0; 5]; 5], [0.0; 5]);
@@ -76,7 +96,7 @@ impl Motion {
             }
             *self = self.moved(&tangent, &step);
             // Quadratic: the error left is the square of the step.
-            if length < 1e-8 {
+            if length < resolution.max(1e-8) {
                 return Outcome::Converged;
             }
         }
@@ -193,25 +213,6 @@ fn damped_step(hessian: &Matrix5<f64>, gradient: &Vector5<f64>, damping: f64) ->
     step.iter().all(|x| x.is_finite()).then_some(step)
 }
 
-/// The derivative of the essential matrix `[t]× R`, row by row, by the five parameters: 9 × 5.
-pub(crate) fn essential_jacobian(motion: &Motion, tangent: &[Vector3<f64>; 2]) -> SMatrix<f64, 9, 5> {
-    let r_21 = motion.q_21.to_rotation_matrix().into_inner();
-    let cross = motion.direction.cross_matrix();
-    let mut jacobian = SMatrix::<f64, 9, 5>::zeros();
-    for k in 0..5 {
-        let derivative = match k {
-            0..3 => cross * Vector3::ith(k, 1.0).cross_matrix() * r_21,
-            _ => tangent[k - 3].cross_matrix() * r_21,
-        };
-        for i in 0..3 {
-            for j in 0..3 {
-                jacobian[(3 * i + j, k)] = derivative[(i, j)];
-            }
-        }
-    }
-    jacobian
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -237,8 +238,7 @@ mod tests {
         let at =
             |m: &Motion| Row::new(&b, &(m.q_21 * a), &m.direction, &tangent_basis(&m.direction)).residual;
         let row = Row::new(&b, &(m.q_21 * a), &m.direction, &tangent);
-        let essential = |m: &Motion| m.direction.cross_matrix() * m.q_21.to_rotation_matrix().into_inner();
-        let jacobian = essential_jacobian(&m, &tangent);
+        let derivatives = m.essential_derivatives(&tangent);
         let h = 1e-6;
         for k in 0..5 {
             let mut step = [0.0; 5];
@@ -248,20 +248,15 @@ mod tests {
             let minus = m.moved(&tangent, &step);
             // Central differences: h² of truncation, ε / h of rounding.
             assert!((row.gradient[k] - (at(&plus) - at(&minus)) / (2.0 * h)).abs() < 1e-9);
-            let difference = (essential(&plus) - essential(&minus)) / (2.0 * h);
-            for i in 0..3 {
-                for j in 0..3 {
-                    assert!((jacobian[(3 * i + j, k)] - difference[(i, j)]).abs() < 1e-9);
-                }
-            }
+            let difference = (plus.essential() - minus.essential()) / (2.0 * h);
+            assert!((derivatives[k] - difference).amax() < 1e-9);
         }
     }
 
     #[test]
     fn twisted_motions_share_the_essential_matrix() {
         let m = motion();
-        let essential = |m: &Motion| m.direction.cross_matrix() * m.q_21.to_rotation_matrix().into_inner();
-        assert!((essential(&m) + essential(&m.twisted())).norm() < 1e-15);
+        assert!((m.essential() + m.twisted().essential()).norm() < 1e-15);
         assert!(m.is_close(&m.twisted().twisted(), 1e-12) && !m.is_close(&m.twisted(), 0.1));
     }
 }

@@ -25,13 +25,14 @@
 
 use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 
-use super::constraints::{Gram, of_five};
+use super::aligned::{Alignment, Gram};
+use super::essential::real_part;
 use super::motion::Motion;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
 use super::{Kinds, PoseSolver};
+use crate::algebra::monomials::position;
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
-use crate::alignment::best_rotation;
-use crate::quaternion::monomials::{MONOMIALS, Quartic, position};
+use crate::quaternion::monomials::{MONOMIALS, Quartic};
 use crate::quaternion::{bilinear, minors_with_q, minors_without_q, ten_quartics};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -56,19 +57,19 @@ impl PoseSolver for QuestEigen {
         if matches.len() < Self::MIN_MATCHES {
             return out.set_degeneracy(Degeneracy::TooFewMatches);
         }
-        let aligned = best_rotation(matches);
-        if pure_rotation(aligned, matches, out) {
-            return;
+        let alignment = Alignment::new(matches);
+        if alignment.is_pure_rotation() {
+            return pure_rotation(&alignment, matches, out);
         }
         let found = match matches.try_into() {
-            Ok(five) => from_five(five),
-            Err(_) => from_many(matches),
+            Ok(five) => from_five(&alignment, five),
+            Err(_) => from_many(&alignment, matches),
         };
         match found {
             Err(degeneracy) => out.set_degeneracy(degeneracy),
             Ok(shortlist) => {
                 if self.kinds == Kinds::All {
-                    out.push(rotation_only(aligned, matches));
+                    out.push(rotation_only(&alignment, matches));
                 }
                 shortlist.write(self.kinds, matches, out);
             }
@@ -77,15 +78,15 @@ impl PoseSolver for QuestEigen {
 }
 
 /// The solutions of five matches.
-fn from_five(matches: &[Correspondence; 5]) -> Result<Shortlist, Degeneracy> {
-    let constraints = of_five(matches)?;
+fn from_five(alignment: &Alignment, matches: &[Correspondence; 5]) -> Result<Shortlist, Degeneracy> {
+    alignment.null_space(matches)?;
     let mut shortlist = Shortlist::new();
     for g in PRE_ROTATIONS.map(pre_rotation) {
         let turned = matches.map(|m| m.with_view2_rotated(&g));
-        let m = constraints.map(|y| bilinear(&(g.to_rotation_matrix() * y)));
+        let m = turned.map(|m| bilinear(&(m.bearing2() * m.bearing1().transpose())));
         let Some(spectrum) = Spectrum::new(&ten_quartics(&turned), &minors_without_q(&m)) else { continue };
         shortlist.retain(CandidateKind::Exact);
-        if spectrum.collect(&g, matches, &mut shortlist) {
+        if spectrum.collect(&g, alignment, matches, &mut shortlist) {
             break;
         }
     }
@@ -93,12 +94,12 @@ fn from_five(matches: &[Correspondence; 5]) -> Result<Shortlist, Degeneracy> {
 }
 
 /// The local minima over more than five matches.
-fn from_many(matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(matches);
-    let constraints = gram.leading_five(matches)?;
+fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
+    let gram = Gram::new(alignment, matches);
+    let [leading @ .., _, _, _, _] = gram.principal_basis(matches)?;
     let mut starts = Shortlist::new();
     let g = pre_rotation(PRE_ROTATIONS[0]);
-    let m = constraints.map(|y| bilinear(&(g.to_rotation_matrix() * y)));
+    let m = leading.map(|row| bilinear(&(g.to_rotation_matrix() * alignment.constraint(&row))));
     if let Some(spectrum) = Spectrum::new(&minors_with_q(&m), &minors_without_q(&m)) {
         for value in spectrum.values {
             if let Some((kind, q_21)) = spectrum.rotation(value, &g) {
@@ -249,6 +250,7 @@ impl Spectrum {
     fn collect(
         &self,
         g: &UnitQuaternion<f64>,
+        alignment: &Alignment,
         matches: &[Correspondence; 5],
         shortlist: &mut Shortlist,
     ) -> bool {
@@ -268,7 +270,7 @@ impl Spectrum {
                 shortlist.push(kind, motion);
                 continue;
             }
-            let Some(solution) = shortlist.push_solution(motion, matches) else {
+            let Some(solution) = shortlist.push_solution(motion, alignment, matches) else {
                 complete = false;
                 continue;
             };
@@ -289,14 +291,4 @@ fn nearest_real(values: &[Complex<f64>], ratio: f64) -> Option<usize> {
     let real = (0..values.len()).filter(|&k| values[k].im == 0.0 && !values[k].re.is_nan());
     let nearest = real.min_by(|i, j| distance(i).total_cmp(&distance(j)))?;
     (distance(&nearest) < 1e-6 * (1.0 + ratio.abs())).then_some(nearest)
-}
-
-/// The real part of a complex quaternion, scaled by the phase that leaves the most of it.
-///
-/// `q·q` without conjugation turns by twice the phase, so the choice does not depend on the frames. The paper's text
-/// leaves it open; making the largest component real depends on them.
-fn real_part(q: [Complex<f64>; 4]) -> [f64; 4] {
-    let square: Complex<f64> = q.iter().map(|x| x * x).sum();
-    let phase = Complex::from_polar(1.0, -0.5 * square.arg());
-    q.map(|x| (x * phase).re)
 }

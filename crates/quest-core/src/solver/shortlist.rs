@@ -1,9 +1,9 @@
 //! From the rotations that a solver finds to the ranked list of candidates: what all solvers share.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Kinds;
-use super::constraints::Gram;
+use super::aligned::{Alignment, Gram};
 use super::motion::{Motion, Outcome};
 use crate::structure::{translation_direction, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
@@ -13,9 +13,6 @@ const SAME: f64 = 1e-6;
 
 /// Residuals below this are zero: rounding, not quality, and must not decide the order.
 const ROUNDING: f64 = 1e-12;
-
-/// A rotation alone explains bearings this close (radians, root mean square).
-const NO_PARALLAX: f64 = 1e-13;
 
 /// Motions found so far, without duplicates.
 #[derive(Clone, Debug)]
@@ -65,9 +62,14 @@ impl Shortlist {
     /// Adds the solution of five constraints near `motion`, and the twisted one beside it; a start from which
     /// Newton's iteration does not converge is kept as it is, and reported as `None`: it stands for a
     /// complex solution that happens to be nearly real.
-    pub(crate) fn push_solution(&mut self, start: Motion, matches: &[Correspondence; 5]) -> Option<Motion> {
+    pub(crate) fn push_solution(
+        &mut self,
+        start: Motion,
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) -> Option<Motion> {
         let mut motion = start;
-        match motion.solve_five(matches, 10) {
+        match motion.solve_five(alignment, matches) {
             Outcome::Converged => {
                 self.push(CandidateKind::Exact, motion);
                 self.push(CandidateKind::Exact, motion.twisted());
@@ -113,7 +115,7 @@ impl Shortlist {
 fn candidate(
     kind: CandidateKind,
     q_21: UnitQuaternion<f64>,
-    direction: &nalgebra::Vector3<f64>,
+    direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Candidate {
     let (pose, in_front) = with_depths(q_21, direction, matches);
@@ -121,25 +123,17 @@ fn candidate(
 }
 
 /// The rotation-only candidate: the best alignment, and the translation that fits it best.
-pub(crate) fn rotation_only(q_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> Candidate {
-    candidate(CandidateKind::RotationOnly, q_21, &translation_direction(&q_21, matches), matches)
+pub(crate) fn rotation_only(alignment: &Alignment, matches: &[Correspondence]) -> Candidate {
+    let direction = translation_direction(&alignment.q0_21, matches);
+    candidate(CandidateKind::RotationOnly, alignment.q0_21, &direction, matches)
 }
 
-/// The candidate of an exact pure rotation, where `q_21` explains the matches to rounding.
-pub(crate) fn pure_rotation(
-    q_21: UnitQuaternion<f64>,
-    matches: &[Correspondence],
-    out: &mut Candidates,
-) -> bool {
-    let pose = RelativePose::new(q_21, nalgebra::Vector3::zeros());
-    let residual = pose.residual(matches);
-    if residual > NO_PARALLAX {
-        return false;
-    }
+/// The one candidate of an exact pure rotation.
+pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], out: &mut Candidates) {
+    let pose = RelativePose::new(alignment.q0_21, Vector3::zeros());
+    let (kind, residual, in_front) = (CandidateKind::RotationOnly, pose.residual(matches), matches.len());
     out.set_degeneracy(Degeneracy::PureRotation);
-    let in_front = matches.len();
-    out.push(Candidate { kind: CandidateKind::RotationOnly, pose, residual, in_front });
-    true
+    out.push(Candidate { kind, pose, residual, in_front });
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.

@@ -1,0 +1,213 @@
+//! The epipolar constraints in the frame of the best alignment, scaled so that they survive a vanishing parallax.
+//!
+//! With `R0` the rotation that best aligns the bearings, `c = R0 a` and `E` the essential matrix between the turned view 1
+//! and view 2, write
+//!
+//! ```text
+//! E = [t]× + p S,   S symmetric,   n = c × b = c × (b − c),   p = rms |n|
+//! bᵀ E c = t · n + p bᵀ S c = p (t · n/p + S · sym(b cᵀ))
+//! ```
+//!
+//! Any matrix has this form. The row `[n/p, sym(b cᵀ)]` of nine unknowns `(t, S)` is of order one however small the
+//! parallax, and so are `t` and `S` at the true motion: `R = R0` to first order in `p`, so that the symmetric part of
+//! `E = [t]× R R0ᵀ` is of order `p`.
+
+use nalgebra::{
+    ComplexField, Matrix3, Matrix5, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector3, Vector5,
+};
+
+use super::motion::Motion;
+use crate::algebra::null_space::null_space;
+use crate::alignment::{best_rotation, best_rotation_of_lines};
+use crate::degeneracy::diagnose;
+use crate::{Correspondence, Degeneracy};
+
+/// Bearings closer to aligned than this (root mean square of the sine) are a pure rotation to rounding.
+const NO_PARALLAX: f64 = 1e-13;
+
+/// Constraints closer to dependent than this have no reliable solution: the smallest pivot of the
+/// rows is at most 1e-15 for collinear, coincident and repeated points, and above 1e-4 for ordinary ones.
+const DEPENDENT: f64 = 1e-11;
+
+/// What [`DEPENDENT`] becomes for the eigenvalues of the Gram matrix, where rounding is.
+const GRAM_DEPENDENT: f64 = 1e-14;
+
+/// Coordinates `(t, S11, S22, S33, S12, S13, S23)` of an essential matrix `[t]× + p S`.
+pub(crate) type Coordinates = [f64; 9];
+
+/// The frame of the best alignment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Alignment {
+    /// The rotation `R0` from camera 1 to camera 2 that best aligns the bearings.
+    pub(crate) q0_21: UnitQuaternion<f64>,
+    /// `p`: how far the bearings are from aligned, root mean square of the sine.
+    pub(crate) parallax: f64,
+}
+
+impl Alignment {
+    pub(crate) fn new(matches: &[Correspondence]) -> Self {
+        let rays = Self::with_rotation(best_rotation(matches), matches);
+        // The constraints hold for lines as well as for rays, and so must what keeps them well scaled.
+        match best_rotation_of_lines(matches).map(|q0_21| Self::with_rotation(q0_21, matches)) {
+            Some(lines) if lines.parallax < rays.parallax => lines,
+            _ => rays,
+        }
+    }
+
+    fn with_rotation(q0_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> Self {
+        let r0_21 = q0_21.to_rotation_matrix();
+        let square = |m: &Correspondence| {
+            let c = r0_21 * m.bearing1();
+            moment(&same_side(m.bearing2(), &c), &c).norm_squared()
+        };
+        let sum: f64 = matches.iter().map(square).sum();
+        Self { q0_21, parallax: (sum / matches.len() as f64).sqrt() }
+    }
+
+    /// Whether a rotation alone explains the matches to the last digit.
+    pub(crate) fn is_pure_rotation(&self) -> bool {
+        self.parallax <= NO_PARALLAX
+    }
+
+    /// How well the direction of the translation is determined (radians): the rounding of the bearings over the
+    /// parallax.
+    pub(crate) fn direction_resolution(&self) -> f64 {
+        1e-13 / self.parallax
+    }
+
+    /// The bearing of camera 1 in the aligned frame.
+    fn turned(&self) -> impl Fn(&Correspondence) -> Vector3<f64> {
+        let r0_21 = self.q0_21.to_rotation_matrix();
+        move |m| r0_21 * m.bearing1()
+    }
+
+    /// The row of a match.
+    #[inline]
+    fn row(&self, b: &Vector3<f64>, c: &Vector3<f64>) -> Coordinates {
+        let b = same_side(b, c);
+        let n = moment(&b, c) / self.parallax;
+        [
+            n.x,
+            n.y,
+            n.z,
+            b.x * c.x,
+            b.y * c.y,
+            b.z * c.z,
+            b.x * c.y + b.y * c.x,
+            b.x * c.z + b.z * c.x,
+            b.y * c.z + b.z * c.y,
+        ]
+    }
+
+    /// The null space of the rows of five matches, or why they are dependent.
+    pub(crate) fn null_space(&self, matches: &[Correspondence; 5]) -> Result<[Coordinates; 4], Degeneracy> {
+        let turned = self.turned();
+        let mut rows = matches.each_ref().map(|m| self.row(m.bearing2(), &turned(m)));
+        let (basis, pivot) = null_space(&mut rows);
+        if pivot < DEPENDENT { Err(diagnose(matches)) } else { Ok(basis) }
+    }
+
+    /// The essential matrix with these coordinates, between the turned view 1 and view 2.
+    #[inline]
+    pub(crate) fn essential<T: ComplexField<RealField = f64> + Copy>(&self, e: &[T; 9]) -> [[T; 3]; 3] {
+        let [tx, ty, tz, rest @ ..] = *e;
+        let [xx, yy, zz, xy, xz, yz] = rest.map(|s| s.scale(self.parallax));
+        [[xx, xy - tz, xz + ty], [xy + tz, yy, yz - tx], [xz - ty, yz + tx, zz]]
+    }
+
+    /// The coordinates of an essential matrix between view 1 and view 2.
+    fn coordinates(&self, e: &Matrix3<f64>) -> Coordinates {
+        let e = e * self.q0_21.to_rotation_matrix().into_inner().transpose();
+        let (half, over_p) = (0.5, 1.0 / self.parallax);
+        [
+            half * (e[(2, 1)] - e[(1, 2)]),
+            half * (e[(0, 2)] - e[(2, 0)]),
+            half * (e[(1, 0)] - e[(0, 1)]),
+            over_p * e[(0, 0)],
+            over_p * e[(1, 1)],
+            over_p * e[(2, 2)],
+            half * over_p * (e[(0, 1)] + e[(1, 0)]),
+            half * over_p * (e[(0, 2)] + e[(2, 0)]),
+            half * over_p * (e[(1, 2)] + e[(2, 1)]),
+        ]
+    }
+
+    /// The constraint `⟨Y, E⟩ = 0` on the essential matrix between view 1 and view 2 that a row stands for; of any
+    /// scale.
+    pub(crate) fn constraint(&self, row: &Coordinates) -> Matrix3<f64> {
+        let [nx, ny, nz, xx, yy, zz, xy, xz, yz] = *row;
+        let n = Vector3::new(nx, ny, nz) * self.parallax;
+        let symmetric = Matrix3::new(2.0 * xx, xy, xz, xy, 2.0 * yy, yz, xz, yz, 2.0 * zz);
+        (symmetric + n.cross_matrix()) * self.q0_21.to_rotation_matrix().into_inner()
+    }
+}
+
+/// `b` or `−b`, the one that points the same way as `c`.
+#[inline]
+fn same_side(b: &Vector3<f64>, c: &Vector3<f64>) -> Vector3<f64> {
+    b * 1.0_f64.copysign(b.dot(c))
+}
+
+/// `n = c × b`, of full relative precision also where the two are close.
+#[inline]
+fn moment(b: &Vector3<f64>, c: &Vector3<f64>) -> Vector3<f64> {
+    c.cross(&(b - c))
+}
+
+/// `Σ y yᵀ` over the rows `y` of any number of matches: the summed squares of their constraints are a quadratic form in the
+/// coordinates of the essential matrix.
+#[derive(Clone, Debug)]
+pub(crate) struct Gram<'a> {
+    alignment: &'a Alignment,
+    sum: SMatrix<f64, 9, 9>,
+}
+
+impl<'a> Gram<'a> {
+    pub(crate) fn new(alignment: &'a Alignment, matches: &[Correspondence]) -> Self {
+        let turned = alignment.turned();
+        let mut lower = [[0.0; 9]; 9];
+        for m in matches {
+            let y = alignment.row(m.bearing2(), &turned(m));
+            for i in 0..9 {
+                for j in 0..=i {
+                    lower[i][j] += y[i] * y[j];
+                }
+            }
+        }
+        Self { alignment, sum: SMatrix::from_fn(|i, j| lower[i.max(j)][i.min(j)]) }
+    }
+
+    /// An orthonormal basis of the nine coordinates, those that the matches constrain most first: the first five
+    /// stand for the constraints of all matches, the last four span the essential matrices that fit them best.
+    pub(crate) fn principal_basis(&self, matches: &[Correspondence]) -> Result<[Coordinates; 9], Degeneracy> {
+        let eigen = SymmetricEigen::new(self.sum);
+        let mut order = [0, 1, 2, 3, 4, 5, 6, 7, 8];
+        order.sort_unstable_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+        if eigen.eigenvalues[order[4]] < GRAM_DEPENDENT * eigen.eigenvalues[order[0]] {
+            return Err(diagnose(matches));
+        }
+        Ok(order.map(|k| std::array::from_fn(|i| eigen.eigenvectors[(i, k)])))
+    }
+
+    /// The summed squares of the constraints at a motion.
+    pub(crate) fn cost(&self, motion: &Motion) -> f64 {
+        let e = SVector::from(self.alignment.coordinates(&motion.essential()));
+        e.dot(&(self.sum * e))
+    }
+
+    /// The normal equations of a Gauss–Newton step in the parameters of [`Motion`].
+    pub(crate) fn normal_equations(
+        &self,
+        motion: &Motion,
+        tangent: &[Vector3<f64>; 2],
+    ) -> (Matrix5<f64>, Vector5<f64>) {
+        let e = SVector::from(self.alignment.coordinates(&motion.essential()));
+        let derivatives = motion.essential_derivatives(tangent);
+        let mut jacobian = SMatrix::<f64, 9, 5>::zeros();
+        for (mut column, derivative) in jacobian.column_iter_mut().zip(&derivatives) {
+            column.copy_from(&SVector::from(self.alignment.coordinates(derivative)));
+        }
+        let weighted = self.sum * jacobian;
+        (jacobian.tr_mul(&weighted), weighted.tr_mul(&e))
+    }
+}

@@ -1,0 +1,339 @@
+//! The five-point problem as a polynomial of degree ten that survives a vanishing parallax.
+//!
+//! Five rows of [`Alignment`](super::aligned::Alignment) leave `(t, S) = x N1 + y N2 + z N3 + w N4`. With `K = [t]×`,
+//! `E = K + p S` and `−K² = |t|² I − t tᵀ`,
+//!
+//! ```text
+//! E Eᵀ              = |t|² I − t tᵀ + p (K S − S K) + p² S²
+//! 2 E Eᵀ − tr(E Eᵀ) I = −2 t tᵀ + p Λ,      Λ = 2 (K S − S K) + p (2 S² − tr(S²) I)
+//! ```
+//!
+//! and as `tᵀ K = 0`, every term of the trace constraint `(2 E Eᵀ − tr(E Eᵀ) I) E = 0` carries the factor `p`. Divided:
+//!
+//! ```text
+//! C = −2 t (tᵀ S) + Λ E = 0                                       nine cubics
+//! det(tr(S) I − 2 S) = 0                                          the tenth
+//! ```
+//!
+//! The tenth stands in place of `det E = p tᵀ S t + p³ det S`, since `tr C + 2 det(E) / p = −p² det(tr(S) I − 2 S)`. As
+//! `p → 0` the ten become the equations of the differential five-point problem, and nothing degenerates.
+//!
+//! From here as D. Nistér, *An efficient solution to the five-point relative pose problem*, PAMI 26 (2004), section 3.2: the
+//! ten cubics in `x, y, z` with `w = 1` are reduced to the six leading monomials that matter; three combinations of
+//! these are linear in `x` and `y`, with coefficients that are polynomials in `z`; their determinant has degree ten.
+
+use nalgebra::ComplexField;
+
+use super::aligned::Coordinates;
+use crate::algebra::elimination;
+use crate::algebra::monomials::{homogeneous, position, sum};
+
+/// Exponents of `(x, y, z, w)` of the ten quadratic monomials.
+const QUADRATIC: [[u8; 4]; 10] = homogeneous::<10>(2);
+
+/// Exponents of the twenty cubic monomials: ten to eliminate, the rest with `x`, with `y` and with neither, by falling
+/// powers of `z`.
+const CUBIC: [[u8; 4]; 20] = [
+    [3, 0, 0, 0],
+    [0, 3, 0, 0],
+    [2, 1, 0, 0],
+    [1, 2, 0, 0],
+    [2, 0, 1, 0],
+    [2, 0, 0, 1],
+    [0, 2, 1, 0],
+    [0, 2, 0, 1],
+    [1, 1, 1, 0],
+    [1, 1, 0, 1],
+    [1, 0, 2, 0],
+    [1, 0, 1, 1],
+    [1, 0, 0, 2],
+    [0, 1, 2, 0],
+    [0, 1, 1, 1],
+    [0, 1, 0, 2],
+    [0, 0, 3, 0],
+    [0, 0, 2, 1],
+    [0, 0, 1, 2],
+    [0, 0, 0, 3],
+];
+
+/// The first of the eliminated rows that is used: `x²z, x²w, y²z, y²w, xyz, xyw`.
+const FIRST_USED: usize = 4;
+
+const VARIABLES: [[u8; 4]; 4] = homogeneous::<4>(1);
+
+/// The quadratic monomial of two variables.
+const SQUARE: [[usize; 4]; 4] = {
+    let mut table = [[0; 4]; 4];
+    let mut a = 0;
+    while a < 16 {
+        table[a / 4][a % 4] = position(&QUADRATIC, sum(VARIABLES[a / 4], VARIABLES[a % 4]));
+        a += 1;
+    }
+    table
+};
+
+/// The cubic monomial of a quadratic one and a variable.
+const PRODUCT: [[usize; 4]; 10] = {
+    let mut table = [[0; 4]; 10];
+    let mut a = 0;
+    while a < 40 {
+        table[a / 4][a % 4] = position(&CUBIC, sum(QUADRATIC[a / 4], VARIABLES[a % 4]));
+        a += 1;
+    }
+    table
+};
+
+type Linear = [f64; 4];
+type Quadratic = [f64; 10];
+type Cubic = [f64; 20];
+
+#[inline(always)]
+fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
+    for i in 0..4 {
+        for j in 0..4 {
+            out[SQUARE[i][j]] += a[i] * b[j];
+        }
+    }
+}
+
+#[inline(always)]
+fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
+    for i in 0..10 {
+        for j in 0..4 {
+            out[PRODUCT[i][j]] += a[i] * b[j];
+        }
+    }
+}
+
+#[inline(always)]
+fn scaled(a: &Linear, factor: f64) -> Linear {
+    a.map(|x| factor * x)
+}
+
+/// The entries of `t`, `S`, `K` and `E` as linear forms in `(x, y, z, w)`.
+struct Forms {
+    t: [Linear; 3],
+    s: [[Linear; 3]; 3],
+    k: [[Linear; 3]; 3],
+    e: [[Linear; 3]; 3],
+}
+
+impl Forms {
+    #[inline(always)]
+    fn new(basis: &[Coordinates; 4], p: f64) -> Self {
+        let form = |row: usize| -> Linear { std::array::from_fn(|m| basis[m][row]) };
+        let [t0, t1, t2, xx, yy, zz, xy, xz, yz]: [Linear; 9] = std::array::from_fn(form);
+        let negative = |a: &Linear| scaled(a, -1.0);
+        let zero = [0.0; 4];
+        let k = [[zero, negative(&t2), t1], [t2, zero, negative(&t0)], [negative(&t1), t0, zero]];
+        let s = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        let e = std::array::from_fn(|i| {
+            std::array::from_fn(|j| std::array::from_fn(|m| k[i][j][m] + p * s[i][j][m]))
+        });
+        Self { t: [t0, t1, t2], s, k, e }
+    }
+
+    /// `Λ`, by its upper triangle.
+    #[inline(always)]
+    fn lambda(&self, p: f64) -> [[Quadratic; 3]; 3] {
+        let mut lambda = [[[0.0; 10]; 3]; 3];
+        let twice = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, 2.0)));
+        let mut trace = [0.0; 10];
+        for i in 0..3 {
+            for j in i..3 {
+                // K S − S K = K S + (K S)ᵀ, and the diagonal of K is zero.
+                let entry = &mut lambda[i][j];
+                for m in 0..3 {
+                    if m != i {
+                        add_linear_product(entry, &self.k[i][m], &twice[m][j]);
+                    }
+                    if m != j {
+                        add_linear_product(entry, &self.k[j][m], &twice[m][i]);
+                    }
+                }
+                let mut square = [0.0; 10];
+                for m in 0..3 {
+                    add_linear_product(&mut square, &twice[i][m], &self.s[m][j]);
+                }
+                for q in 0..10 {
+                    entry[q] += p * square[q];
+                    if i == j {
+                        trace[q] += 0.5 * square[q];
+                    }
+                }
+            }
+        }
+        for i in 0..3 {
+            for q in 0..10 {
+                lambda[i][i][q] -= p * trace[q];
+            }
+        }
+        lambda
+    }
+
+    /// `det(tr(S) I − 2 S)`.
+    #[inline(always)]
+    fn tenth(&self) -> Cubic {
+        let mut d = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, -2.0)));
+        for i in 0..3 {
+            for m in 0..4 {
+                d[i][i][m] += self.s[0][0][m] + self.s[1][1][m] + self.s[2][2][m];
+            }
+        }
+        let mut out = [0.0; 20];
+        for j in 0..3 {
+            let (a, b) = ((j + 1) % 3, (j + 2) % 3);
+            let mut minor = [0.0; 10];
+            add_linear_product(&mut minor, &d[1][a], &d[2][b]);
+            add_linear_product(&mut minor, &scaled(&d[1][b], -1.0), &d[2][a]);
+            add_product(&mut out, &minor, &d[0][j]);
+        }
+        out
+    }
+}
+
+/// The ten divided cubics over [`CUBIC`].
+fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
+    let forms = Forms::new(basis, p);
+    let lambda = forms.lambda(p);
+    let mut out = [[0.0; 20]; 10];
+    for j in 0..3 {
+        // Entry j of −2 tᵀ S.
+        let mut row = [0.0; 10];
+        for m in 0..3 {
+            add_linear_product(&mut row, &scaled(&forms.t[m], -2.0), &forms.s[m][j]);
+        }
+        for i in 0..3 {
+            let cubic = &mut out[3 * i + j];
+            add_product(cubic, &row, &forms.t[i]);
+            for m in 0..3 {
+                add_product(cubic, &lambda[i.min(m)][i.max(m)], &forms.e[m][j]);
+            }
+        }
+    }
+    out[9] = forms.tenth();
+    out
+}
+
+/// Three equations `X(z) x + Y(z) y + W(z) = 0`; coefficients from the constant up.
+pub(crate) struct Resultant {
+    x: [[f64; 4]; 3],
+    y: [[f64; 4]; 3],
+    w: [[f64; 5]; 3],
+}
+
+impl Resultant {
+    /// The three equations, and how far the elimination was from singular.
+    pub(crate) fn new(basis: &[Coordinates; 4], p: f64) -> (Self, f64) {
+        let mut cubics = ten_cubics(basis, p);
+        let pivot = elimination::reduce(&mut cubics, FIRST_USED);
+        let mut out = Self { x: [[0.0; 4]; 3], y: [[0.0; 4]; 3], w: [[0.0; 5]; 3] };
+        for r in 0..3 {
+            // The row led by a monomial times z, less z times the row led by the monomial: no leader is left.
+            let tail = |row: usize| &cubics[FIRST_USED + 2 * r + row][10..];
+            let (with_z, without) = (tail(0), tail(1));
+            for k in 0..3 {
+                out.x[r][k] += with_z[2 - k];
+                out.x[r][k + 1] -= without[2 - k];
+                out.y[r][k] += with_z[5 - k];
+                out.y[r][k + 1] -= without[5 - k];
+            }
+            for k in 0..4 {
+                out.w[r][k] += with_z[9 - k];
+                out.w[r][k + 1] -= without[9 - k];
+            }
+        }
+        (out, pivot)
+    }
+
+    /// The determinant, whose roots are the values of `z`.
+    pub(crate) fn polynomial(&self) -> [f64; 11] {
+        let mut out = [0.0; 11];
+        for r in 0..3 {
+            let (i, j) = ((r + 1) % 3, (r + 2) % 3);
+            let mut minor = [0.0; 7];
+            for a in 0..4 {
+                for b in 0..4 {
+                    minor[a + b] += self.x[i][a] * self.y[j][b] - self.y[i][a] * self.x[j][b];
+                }
+            }
+            for a in 0..7 {
+                for b in 0..5 {
+                    out[a + b] += minor[a] * self.w[r][b];
+                }
+            }
+        }
+        out
+    }
+
+    /// `(x, y, z, w)` at a root, up to scale: the null vector of the three equations.
+    pub(crate) fn point<T: ComplexField<RealField = f64> + Copy>(&self, z: T) -> [T; 4] {
+        let m: [[T; 3]; 3] =
+            std::array::from_fn(|r| [horner(&self.x[r], z), horner(&self.y[r], z), horner(&self.w[r], z)]);
+        let cross = |a: &[T; 3], b: &[T; 3]| -> [T; 3] {
+            std::array::from_fn(|k| {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                a[i] * b[j] - a[j] * b[i]
+            })
+        };
+        let candidates = [cross(&m[0], &m[1]), cross(&m[1], &m[2]), cross(&m[2], &m[0])];
+        let size = |v: &[T; 3]| v.iter().map(|x| x.modulus_squared()).sum::<f64>();
+        let sizes = candidates.each_ref().map(size);
+        let largest = (1..3).fold(0, |best, k| if sizes[k] > sizes[best] { k } else { best });
+        let [x, y, w] = candidates[largest];
+        [x, y, z * w, w]
+    }
+}
+
+#[inline]
+fn horner<T: ComplexField<RealField = f64> + Copy, const N: usize>(p: &[f64; N], z: T) -> T {
+    let mut value = T::from_real(p[N - 1]);
+    for c in p[..N - 1].iter().rev() {
+        value = value * z + T::from_real(*c);
+    }
+    value
+}
+
+/// `x N1 + y N2 + z N3 + w N4`.
+pub(crate) fn combine<T: ComplexField<RealField = f64> + Copy>(
+    basis: &[Coordinates; 4],
+    point: &[T; 4],
+) -> [T; 9] {
+    std::array::from_fn(|k| {
+        let mut sum = T::zero();
+        for m in 0..4 {
+            sum += point[m].scale(basis[m][k]);
+        }
+        sum
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algebra::monomials::evaluate;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn cubics_are_the_trace_constraint_divided_by_p() {
+        let basis: [Coordinates; 4] =
+            std::array::from_fn(|m| std::array::from_fn(|k| ((3 * m + 7 * k) as f64 * 1.3 + 0.2).sin()));
+        let v = [0.3, -0.8, 0.5, 1.0];
+        let p = 0.37;
+        let [tx, ty, tz, xx, yy, zz, xy, xz, yz] = combine(&basis, &v);
+        let t = nalgebra::Vector3::new(tx, ty, tz);
+        let s = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let e = t.cross_matrix() + s * p;
+        let eet = e * e.transpose();
+        let expected = (eet * 2.0 - Matrix3::from_diagonal_element(eet.trace())) * e / p;
+        let cubics = ten_cubics(&basis, p);
+        let value = |c: &Cubic| evaluate(&CUBIC, c, v);
+        for i in 0..3 {
+            for j in 0..3 {
+                assert!((value(&cubics[3 * i + j]) - expected[(i, j)]).abs() < 1e-13);
+            }
+        }
+        let trace: f64 = (0..3).map(|i| value(&cubics[4 * i])).sum();
+        assert!((trace + 2.0 * e.determinant() / p + p * p * value(&cubics[9])).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,148 @@
+//! From an essential matrix to rotations and translation, over the real and the complex numbers.
+//!
+//! With `E = [t]× R` and `t·t = 1`
+//!
+//! ```text
+//! cof E = t (Rᵀ t)ᵀ        R = cof E − [t]× E        E·E = Σ E_ij² = 2
+//! ```
+//!
+//! where no product is conjugated, so that the formulas hold for complex matrices as well. The other rotation is `t ⊗ q`.
+
+use nalgebra::{Complex, ComplexField};
+
+type Vector<T> = [T; 3];
+
+#[inline]
+fn cross<T: ComplexField + Copy>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline]
+fn square_size<T: ComplexField<RealField = f64> + Copy>(v: &[T]) -> f64 {
+    v.iter().map(|x| x.modulus_squared()).sum()
+}
+
+/// The index of the largest of a few sizes.
+#[inline]
+fn largest<const N: usize>(sizes: &[f64; N]) -> usize {
+    (1..N).fold(0, |best, k| if sizes[k] > sizes[best] { k } else { best })
+}
+
+/// The quaternion of one of the two rotations, scalar first and of any scale, and the translation with `t·t = 1`, of an
+/// essential matrix of any scale, row by row.
+///
+/// `None` for a matrix that is zero or not finite.
+#[inline]
+pub(crate) fn decompose<T: ComplexField<RealField = f64> + Copy>(
+    e: &[Vector<T>; 3],
+) -> Option<([T; 4], Vector<T>)> {
+    let mut sum = T::zero();
+    for x in e.as_flattened() {
+        sum += *x * *x;
+    }
+    let scale = (T::from_real(2.0) / sum).sqrt();
+    let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j] * scale));
+    let cofactors: [Vector<T>; 3] =
+        std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
+    let longest = cofactors[largest(&cofactors.each_ref().map(|c| square_size(c)))];
+    let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt();
+    let inverse = T::one() / length;
+    let t = longest.map(|x| x * inverse);
+    let r: [Vector<T>; 3] = std::array::from_fn(|j| {
+        let turned = cross(&t, &columns[j]);
+        std::array::from_fn(|i| cofactors[j][i] - turned[i])
+    });
+    let q = quaternion(&r);
+    square_size(&q).is_finite().then_some((q, t))
+}
+
+/// The quaternion, of any scale, of an orthogonal matrix given by its columns: the row of `4 q qᵀ` with the
+/// largest diagonal entry.
+#[inline]
+fn quaternion<T: ComplexField<RealField = f64> + Copy>(columns: &[Vector<T>; 3]) -> [T; 4] {
+    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = *columns;
+    let one = T::one();
+    let diagonal = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
+    let (wx, wy, wz) = (zy - yz, xz - zx, yx - xy);
+    let (sxy, sxz, syz) = (yx + xy, zx + xz, zy + yz);
+    match largest(&diagonal.map(|d| d.modulus_squared())) {
+        0 => [diagonal[0], wx, wy, wz],
+        1 => [wx, diagonal[1], sxy, sxz],
+        2 => [wy, sxy, diagonal[2], syz],
+        _ => [wz, sxz, syz, diagonal[3]],
+    }
+}
+
+/// The quaternion of the other rotation: `t ⊗ q`, with `t` a pure quaternion.
+#[inline]
+pub(crate) fn twisted<T: ComplexField + Copy>(q: &[T; 4], t: &Vector<T>) -> [T; 4] {
+    let v = [q[1], q[2], q[3]];
+    let turned = cross(t, &v);
+    let scalar = -(t[0] * v[0] + t[1] * v[1] + t[2] * v[2]);
+    [scalar, q[0] * t[0] + turned[0], q[0] * t[1] + turned[1], q[0] * t[2] + turned[2]]
+}
+
+/// The real part of a complex quaternion, scaled by the phase that leaves the most of it.
+///
+/// `q·q` without conjugation turns by twice the phase, so that the choice does not depend on the frames of the
+/// cameras, unlike the one that makes the largest component real.
+pub(crate) fn real_part(q: [Complex<f64>; 4]) -> [f64; 4] {
+    let square: Complex<f64> = q.iter().map(|x| x * x).sum();
+    let phase = square.sqrt().conj();
+    q.map(|x| (x * phase).re)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+    fn planted(rotation: Vector3<f64>, t: Vector3<f64>) -> (UnitQuaternion<f64>, [[f64; 3]; 3]) {
+        let q = UnitQuaternion::new(rotation);
+        let e = t.cross_matrix() * q.to_rotation_matrix().into_inner();
+        (q, std::array::from_fn(|i| std::array::from_fn(|j| e[(i, j)])))
+    }
+
+    #[test]
+    fn both_rotations_and_the_translation_are_recovered() {
+        let pi = std::f64::consts::PI;
+        let t = Vector3::new(0.6, -0.3, 1.7);
+        let axis = Vector3::new(0.48, -0.6, 0.64);
+        for angle in [0.0, 1e-9, 1.0, pi - 1e-9, pi] {
+            let (q, e) = planted(axis * angle, t);
+            let (found, direction) = decompose(&e).unwrap();
+            let other = twisted(&found, &direction);
+            let cosine = |f: [f64; 4]| {
+                UnitQuaternion::new_normalize(Quaternion::new(f[0], f[1], f[2], f[3]))
+                    .coords
+                    .dot(&q.coords)
+                    .abs()
+            };
+            assert!(1.0 - cosine(found).max(cosine(other)) < 1e-15);
+            assert!(Vector3::from(direction).cross(&t).norm() < 1e-15);
+            let complex = decompose(&e.map(|row| row.map(|x| Complex::new(x, 0.0) * Complex::i()))).unwrap();
+            let real = real_part(complex.0);
+            let twin = real_part(twisted(&complex.0, &complex.1));
+            assert!(1.0 - cosine(real).max(cosine(twin)) < 1e-15);
+        }
+    }
+
+    #[test]
+    fn matrices_without_a_pose_have_none() {
+        assert!(decompose(&[[0.0; 3]; 3]).is_none());
+        assert!(decompose(&[[f64::NAN; 3]; 3]).is_none());
+    }
+
+    #[test]
+    fn real_part_forgets_the_phase_and_nothing_else() {
+        let q = [0.1, -0.7, 0.5, 0.3];
+        for angle in [0.0, 0.4, 2.0, 3.0] {
+            let turned = q.map(|x| Complex::from_polar(x, angle));
+            let real = real_part(turned);
+            let sign = real[1].signum() * q[1].signum();
+            let length = real.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let expected = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            assert!((0..4).all(|k| (sign * real[k] / length - q[k] / expected).abs() < 1e-15));
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! `quest`: the default solver, right at every parallax.
+//!
+//! **Problem.** Rotation, translation and depths from five or more matches, also where the translation is so small against
+//! the depths that the essential matrix, divided by its own norm, no longer holds the rotation.
+//!
+//! **Steps** for five matches:
+//! 1. The rotation `R0` that best aligns the bearings, and the parallax `p` that it leaves: [`super::aligned`]. With none
+//!    left the motion is a pure rotation.
+//! 2. The null space of the five rows `[n/p, sym(b cᵀ)]`: the essential matrix is `[t]× + p S`, `S` symmetric.
+//! 3. Ten cubics without the factor `p`, a polynomial of degree ten, its real roots by Sturm's theorem:
+//!    [`super::cubics`].
+//! 4. Each root gives an essential matrix, two rotations and a translation; Newton's iteration on the five
+//!    parameters of the motion brings the constraints to zero.
+//! 5. A complex pair of roots gives two complex quaternions: their real parts. Under noise the true pose often hides there.
+//! 6. Translation and depths with one scale: [`crate::structure`].
+//!
+//! For more matches the null space is that of all rows in the least-squares sense, and every solution is refined over
+//! all matches.
+//!
+//! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points).
+//! **Solutions**: at most ten essential matrices, twenty rotations, and the rotation-only candidate.
+//!
+//! The parallax-safe form is this project's; the elimination to degree ten is Nistér's (PAMI 2004).
+
+use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
+
+use super::aligned::{Alignment, Coordinates, Gram};
+use super::cubics::{Resultant, combine};
+use super::essential::{decompose, real_part, twisted};
+use super::motion::Motion;
+use super::shortlist::{Shortlist, pure_rotation, rotation_only};
+use super::{Kinds, PoseSolver};
+use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
+use crate::structure::translation_direction;
+use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+
+/// The default solver; see the [module](self) for its steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quest {
+    /// Which candidates are returned.
+    pub kinds: Kinds,
+}
+
+impl PoseSolver for Quest {
+    const NAME: &'static str = "quest";
+    const MIN_MATCHES: usize = 5;
+
+    fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
+        out.clear();
+        if matches.len() < Self::MIN_MATCHES {
+            return out.set_degeneracy(Degeneracy::TooFewMatches);
+        }
+        let alignment = Alignment::new(matches);
+        if alignment.is_pure_rotation() {
+            return pure_rotation(&alignment, matches, out);
+        }
+        let found = match matches.try_into() {
+            Ok(five) => from_five(self.kinds, &alignment, five),
+            Err(_) => from_many(&alignment, matches),
+        };
+        match found {
+            Err(degeneracy) => out.set_degeneracy(degeneracy),
+            Ok(shortlist) => {
+                if self.kinds == Kinds::All {
+                    out.push(rotation_only(&alignment, matches));
+                }
+                shortlist.write(self.kinds, matches, out);
+            }
+        }
+    }
+}
+
+/// The solutions of five matches.
+fn from_five(
+    kinds: Kinds,
+    alignment: &Alignment,
+    matches: &[Correspondence; 5],
+) -> Result<Shortlist, Degeneracy> {
+    let mut basis = alignment.null_space(matches)?;
+    let mut shortlist = Shortlist::new();
+    for mixing in MIXINGS {
+        shortlist.retain(CandidateKind::Exact);
+        let roots = Roots::new(&basis, alignment);
+        let complete = roots.real(|motion| shortlist.push_solution(motion, alignment, matches).is_some());
+        if kinds == Kinds::All {
+            roots.complex(|q_21| {
+                let direction = translation_direction(&q_21, matches);
+                shortlist.push(CandidateKind::FromComplex, Motion { q_21, direction });
+            });
+        }
+        // Every real root is an essential matrix of its own.
+        if complete && shortlist.count(CandidateKind::Exact) >= 2 * roots.real.as_slice().len() {
+            break;
+        }
+        basis = mixed(&basis, &mixing);
+    }
+    Ok(shortlist)
+}
+
+/// The local minima over more than five matches.
+fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
+    let gram = Gram::new(alignment, matches);
+    let [_, _, _, _, _, basis @ ..] = gram.principal_basis(matches)?;
+    let roots = Roots::new(&basis, alignment);
+    let mut starts = Shortlist::new();
+    roots.real(|motion| {
+        starts.push(CandidateKind::Exact, motion);
+        true
+    });
+    roots.complex(|q_21| {
+        let direction = translation_direction(&q_21, matches);
+        starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
+    });
+    Ok(starts.refined(&gram, matches))
+}
+
+/// An elimination that comes this close to singular has lost half of its digits.
+const SMALL_PIVOT: f64 = 1e-8;
+
+/// Orthogonal changes of the null space's basis, for another attempt where the first did badly: the last
+/// basis vector may be absent from a solution, which puts its root at infinity.
+const MIXINGS: [[[f64; 4]; 4]; 2] = [
+    [[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, 0.5, -0.5], [0.5, 0.5, -0.5, -0.5], [0.5, -0.5, -0.5, 0.5]],
+    [[0.8, 0.0, 0.6, 0.0], [0.0, 0.28, 0.0, 0.96], [-0.6, 0.0, 0.8, 0.0], [0.0, -0.96, 0.0, 0.28]],
+];
+
+fn mixed(basis: &[Coordinates; 4], mixing: &[[f64; 4]; 4]) -> [Coordinates; 4] {
+    mixing.map(|row| combine(basis, &row))
+}
+
+/// The essential matrices of a null space, as roots of its polynomial.
+struct Roots<'a> {
+    basis: &'a [Coordinates; 4],
+    alignment: &'a Alignment,
+    resultant: Resultant,
+    polynomial: [f64; 11],
+    real: RealRoots<11>,
+}
+
+impl<'a> Roots<'a> {
+    fn new(basis: &'a [Coordinates; 4], alignment: &'a Alignment) -> Self {
+        let (resultant, pivot) = Resultant::new(basis, alignment.parallax);
+        let polynomial = resultant.polynomial();
+        let mut real = real_roots(&polynomial);
+        real.certain &= pivot > SMALL_PIVOT;
+        Self { basis, alignment, resultant, polynomial, real }
+    }
+
+    /// Hands over the motion of each real root, with one of its two rotations. Whether every root was found and `accept`
+    /// took its motion.
+    fn real(&self, mut accept: impl FnMut(Motion) -> bool) -> bool {
+        let mut complete = self.real.certain;
+        for &z in self.real.as_slice() {
+            let coordinates = combine(self.basis, &self.resultant.point(z));
+            let motion = decompose(&self.alignment.essential(&coordinates)).map(|(q, t)| Motion {
+                q_21: unit(q) * self.alignment.q0_21,
+                direction: Vector3::from(t).normalize(),
+            });
+            complete &= motion.is_some_and(&mut accept);
+        }
+        complete
+    }
+
+    /// Hands over the real parts of both rotations of each complex pair of roots.
+    fn complex(&self, mut accept: impl FnMut(UnitQuaternion<f64>)) {
+        let mut roots = [Complex::from(0.0); 11];
+        let count = complex_roots(&self.polynomial, self.real.as_slice(), &mut roots);
+        for &z in &roots[..count] {
+            let coordinates = combine(self.basis, &self.resultant.point(z));
+            let Some((q, t)) = decompose(&self.alignment.essential(&coordinates)) else { continue };
+            for q in [q, twisted(&q, &t)] {
+                accept(unit(real_part(q)) * self.alignment.q0_21);
+            }
+        }
+    }
+}
+
+fn unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+}
