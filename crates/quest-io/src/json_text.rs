@@ -1,0 +1,57 @@
+//! JSON for people: one key a line, lists of numbers on the line of their key.
+
+use std::io;
+
+use serde::Serialize;
+use serde_json::{Serializer, ser::Formatter};
+
+/// Writes `value` as indented JSON that ends in a newline. Numbers that are not finite become `null`.
+///
+/// # Errors
+/// What `writer` says.
+pub fn write_json<T: Serialize + ?Sized>(mut writer: &mut dyn io::Write, value: &T) -> io::Result<()> {
+    value.serialize(&mut Serializer::with_formatter(&mut writer, Indented::default()))?;
+    writer.write_all(b"\n")
+}
+
+/// Breaks lines in objects and in lists of objects, not in lists of numbers.
+#[derive(Default)]
+struct Indented {
+    /// How many objects are open.
+    depth: usize,
+}
+
+impl Indented {
+    fn new_line<W: io::Write + ?Sized>(&self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b"\n")?;
+        (0..self.depth).try_for_each(|_| writer.write_all(b"  "))
+    }
+}
+
+impl Formatter for Indented {
+    fn begin_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        writer.write_all(b"{")
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        self.new_line(writer)?;
+        writer.write_all(b"}")
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        if !first {
+            writer.write_all(b",")?;
+        }
+        self.new_line(writer)
+    }
+
+    fn begin_object_value<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b": ")
+    }
+
+    fn begin_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        writer.write_all(if first { b"" } else { b", " })
+    }
+}
