@@ -29,8 +29,10 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     };
     for row in reader.records() {
         let row = row.map_err(|e| csv_error(&e))?;
-        let here =
-            place.at_line(row.position().map_or(1, |p| usize::try_from(p.line()).unwrap_or(usize::MAX)));
+        if row.iter().all(str::is_empty) && row.len() == 1 {
+            continue;
+        }
+        let here = place.at_line(line(text, &row));
         if row.len() != header.len() {
             return Err(here.error(Fault::FieldCount { found: row.len(), expected: header.len() }));
         }
@@ -44,6 +46,15 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
         }
     }
     Ok(pair)
+}
+
+/// The line that a row stands on. The position of the csv crate is the end of the row before, which blank lines
+/// and one half of `\r\n` may follow.
+fn line(text: &str, row: &StringRecord) -> usize {
+    let end = row.position().map_or(0, |p| usize::try_from(p.byte()).unwrap_or(usize::MAX));
+    let text = text.as_bytes();
+    let blank = text[end.min(text.len())..].iter().take_while(|b| b"\r\n".contains(b)).count();
+    text[..(end + blank).min(text.len())].split(|&b| b == b'\n').count()
 }
 
 fn known(column: &str) -> bool {

@@ -2,7 +2,7 @@
 
 use std::{fmt, io};
 
-use quest_core::{CameraError, InputError};
+use quest_core::{CameraError, InputError, MatchError};
 
 /// A place in a file, `file:line:column: key`, as far as it is known.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -119,11 +119,14 @@ pub enum Fault {
         expected: usize,
     },
     /// A quaternion is not a rotation.
-    #[error("found a quaternion of length {0:.6}, expected length 1 (w, x, y, z)")]
+    #[error("found a quaternion of length {0:?}, expected length 1 (w, x, y, z)")]
     NotUnit(f64),
-    /// The matches are unusable.
+    /// One match is unusable.
     #[error("{0}")]
-    Matches(InputError),
+    Match(#[from] MatchError),
+    /// The matches as a whole are unusable.
+    #[error("{0}")]
+    Matches(#[from] InputError),
 }
 
 /// The system's words without the number that Rust appends.
@@ -132,11 +135,5 @@ pub(crate) fn plain(error: &io::Error) -> String {
     match text.rfind(" (os error ") {
         Some(end) => text[..end].to_owned(),
         None => text,
-    }
-}
-
-impl From<InputError> for Fault {
-    fn from(error: InputError) -> Self {
-        Self::Matches(error)
     }
 }

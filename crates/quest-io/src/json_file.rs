@@ -1,30 +1,29 @@
 //! JSON: one object a pair.
 
-use std::fmt;
+use std::{fmt, marker::PhantomData};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use quest_core::Camera;
 use serde::{
     Deserialize, Deserializer,
-    de::{Error, SeqAccess, Visitor},
+    de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
-use serde_json::error::Category;
 
 use crate::{
     Pair, Truth,
     camera::camera,
     error::{Fault, Place, ReadError},
+    json_words,
 };
 
 /// How far from 1 the length of a true quaternion may be: four written decimals stay within it.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
 #[derive(Deserialize)]
-#[serde(expecting = "an object with the key `matches`")]
 struct PairFile {
     name: Option<String>,
-    camera1: Option<CameraFile>,
-    camera2: Option<CameraFile>,
+    camera1: Option<Object<CameraFile>>,
+    camera2: Option<Object<CameraFile>>,
     matches: Vec<Numbers<4>>,
     scores: Option<Vec<f64>>,
     q_21: Option<Numbers<4>>,
@@ -32,7 +31,6 @@ struct PairFile {
 }
 
 #[derive(Deserialize)]
-#[serde(expecting = "a camera, an object with the keys `model` and `params`")]
 struct CameraFile {
     model: String,
     width: Option<u32>,
@@ -74,24 +72,47 @@ impl<'de, const N: usize> Visitor<'de> for NumbersVisitor<N> {
     }
 }
 
+/// An object of the form `T`. A struct of serde takes a list of its values as well.
+struct Object<T>(T);
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Object<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(ObjectVisitor(PhantomData))
+    }
+}
+
+struct ObjectVisitor<T>(PhantomData<T>);
+
+impl<'de, T: DeserializeOwned> Visitor<'de> for ObjectVisitor<T> {
+    type Value = Object<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Object<T>, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(map)).map(Object)
+    }
+}
+
 /// The pair in `text`, which starts at `place`: at its line where it has one, else at line 1 of the file.
 pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     let mut unknown_keys = Vec::new();
     let mut track = serde_path_to_error::Track::new();
     let mut json = serde_json::Deserializer::from_str(text);
     let tracked = serde_path_to_error::Deserializer::new(&mut json, &mut track);
-    let file: Result<PairFile, _> = serde_ignored::deserialize(tracked, |path| {
+    let file: Result<Object<PairFile>, _> = serde_ignored::deserialize(tracked, |path| {
         // serde_ignored writes `camera1.?.k` for a key of an optional object.
         unknown_keys.push(path.to_string().replace(".?", ""));
     });
-    let file = file.map_err(|e| json_error(place, &track.path().to_string(), &e))?;
-    json.end().map_err(|e| json_error(place, ".", &e))?;
-    check(place, file, unknown_keys)
+    let file = file.map_err(|e| json_words::error(place, text, &track.path().to_string(), &e))?;
+    json.end().map_err(|e| json_words::error(place, text, ".", &e))?;
+    check(place, file.0, unknown_keys)
 }
 
 fn check(place: &Place, file: PairFile, unknown_keys: Vec<String>) -> Result<Pair, ReadError> {
-    let camera1 = file.camera1.map(|c| c.check(&place.at_key("camera1"))).transpose()?;
-    let camera2 = file.camera2.map(|c| c.check(&place.at_key("camera2"))).transpose()?;
+    let camera1 = file.camera1.map(|c| c.0.check(&place.at_key("camera1"))).transpose()?;
+    let camera2 = file.camera2.map(|c| c.0.check(&place.at_key("camera2"))).transpose()?;
     let cameras = match (camera1, camera2) {
         (None, None) => None,
         (Some(camera1), camera2) => Some([camera1.clone(), camera2.unwrap_or(camera1)]),
@@ -133,49 +154,4 @@ fn unit(place: &Place, [w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, Re
         return Ok(UnitQuaternion::new_normalize(q));
     }
     Err(place.clone().error(Fault::NotUnit(norm)))
-}
-
-fn json_error(place: &Place, path: &str, error: &serde_json::Error) -> ReadError {
-    let mut here = match place.line {
-        Some(_) => place.clone(),
-        None => place.at_line(error.line().max(1)),
-    };
-    here.column = Some(error.column().max(1));
-    if path != "." {
-        here = here.at_key(path);
-    }
-    let text = error.to_string();
-    let text = text.rfind(" at line ").map_or(text.as_str(), |end| &text[..end]);
-    here.error(Fault::Json(in_words(error.classify(), text)))
-}
-
-/// The parser's words in this crate's: what was found, what was expected.
-fn in_words(category: Category, text: &str) -> String {
-    if category == Category::Eof {
-        let inside = text.strip_prefix("EOF while parsing ").unwrap_or("a value");
-        return format!("found the end of the text inside {inside}, expected the rest of the JSON");
-    }
-    if text == "trailing characters" {
-        return "found more text after the JSON object, expected one object (JSON Lines: the extension .jsonl)"
-            .to_owned();
-    }
-    if text == "number out of range" {
-        return "found a number out of range, expected one below 1.8e308".to_owned();
-    }
-    if let Some(key) = text.strip_prefix("missing field ") {
-        return format!("found no key {key}, expected one");
-    }
-    if let Some(key) = text.strip_prefix("duplicate field ") {
-        return format!("found the key {key} twice, expected it once");
-    }
-    for prefix in ["invalid type: ", "invalid value: "] {
-        if let Some(rest) = text.strip_prefix(prefix) {
-            let rest = rest.replace("expected f64", "expected a number");
-            return format!(
-                "found {}",
-                rest.replace("expected u32", "expected a whole number from 0 to 4294967295")
-            );
-        }
-    }
-    if category == Category::Syntax { format!("not JSON: {text}") } else { text.to_owned() }
 }

@@ -22,6 +22,7 @@ mod csv_file;
 mod error;
 mod json_file;
 mod json_text;
+mod json_words;
 mod output;
 mod pair;
 mod read;

@@ -56,7 +56,7 @@ impl Pair {
     pub fn refuse(&self, error: InputError) -> ReadError {
         match error {
             InputError::Match { index, source } => {
-                self.place.at_key(format!("matches[{index}]")).error(InputError::Match { index, source })
+                self.place.at_key(format!("matches[{index}]")).error(source)
             }
             other => self.place.at_key("matches").error(other),
         }
