@@ -21,11 +21,17 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod algebra;
+pub mod alignment;
 pub mod camera;
 pub mod candidate;
 pub mod correspondence;
+mod degeneracy;
+pub mod feasibility;
 pub mod pose;
+pub mod quaternion;
 pub mod solver;
+pub mod structure;
 
 pub use camera::{Camera, CameraError, CameraModel};
 pub use candidate::{Candidate, CandidateKind, Candidates, Degeneracy};
