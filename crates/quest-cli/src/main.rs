@@ -2,6 +2,7 @@
 //!
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
+mod candidate_table;
 mod options;
 mod rows;
 mod solve;

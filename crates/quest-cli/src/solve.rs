@@ -10,9 +10,9 @@ use quest_core::{
 use quest_io::{Fault, Output, Pair, ReadError, SolveRecord, WriteError};
 
 use crate::{
-    Failure, Outcome,
+    Failure, Outcome, candidate_table,
     options::{Format, InputFormat, OutputOptions, parse_camera, solver_parser},
-    rows, table, words,
+    rows, words,
 };
 
 const EXAMPLES: &str = "\
@@ -191,7 +191,7 @@ impl Writer {
                 if record.candidates.is_empty() {
                     return Ok(());
                 }
-                writeln!(w, "\n{}", table::candidates(&record, focal))
+                writeln!(w, "\n{}", candidate_table::text(&record, focal))
             }),
         }
     }

@@ -1,7 +1,7 @@
 //! `quest-cli solvers`: the table of solvers.
 
 use clap::Args;
-use comfy_table::{Cell, CellAlignment};
+use comfy_table::Cell;
 use quest_core::solver::SolverName;
 use serde::Serialize;
 
@@ -58,8 +58,8 @@ fn as_table(records: &[SolverRecord]) -> String {
     for record in records {
         table.add_row([
             Cell::new(record.name),
-            Cell::new(record.min_matches).set_alignment(CellAlignment::Right),
-            Cell::new(record.max_candidates).set_alignment(CellAlignment::Right),
+            table::right(record.min_matches),
+            table::right(record.max_candidates),
             Cell::new(record.reference),
         ]);
     }

@@ -13,10 +13,8 @@ const SCORE: &str = "score";
 /// The pair in `text`. Columns are found by name, in any order.
 pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     let mut reader = ReaderBuilder::new().flexible(true).trim(Trim::All).from_reader(text.as_bytes());
-    let csv_error = |e: &csv::Error| {
-        let line = e.position().map_or(1, |p| usize::try_from(p.line()).unwrap_or(usize::MAX));
-        place.at_line(line).error(Fault::Csv(e.to_string()))
-    };
+    // The text is UTF-8 and rows may have any length: there is nothing left that the parser could refuse.
+    let csv_error = |e: &csv::Error| place.clone().error(Fault::Csv(e.to_string()));
     let header = reader.headers().map_err(|e| csv_error(&e))?.clone();
     let (columns, score) = columns(&header)
         .ok_or_else(|| place.at_line(1).error(Fault::Header(header.iter().collect::<Vec<_>>().join(","))))?;
@@ -29,24 +27,30 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     };
     for row in reader.records() {
         let row = row.map_err(|e| csv_error(&e))?;
-        if row.iter().all(str::is_empty) && row.len() == 1 {
+        if row.len() == 1 && row[0].is_empty() {
             continue;
         }
-        let here = place.at_line(line(text, &row));
+        let refuse = |(key, fault): Refusal| {
+            let here = place.at_line(line(text, &row));
+            Place { key: key.map(str::to_owned), ..here }.error(fault)
+        };
         if row.len() != header.len() {
-            return Err(here.error(Fault::FieldCount { found: row.len(), expected: header.len() }));
+            return Err(refuse((None, Fault::FieldCount { found: row.len(), expected: header.len() })));
         }
         let mut values = [0.0; 4];
-        for (value, column) in values.iter_mut().zip(columns) {
-            *value = number(&here, &header[column], &row[column])?;
+        for ((value, column), name) in values.iter_mut().zip(columns).zip(COLUMNS) {
+            *value = number(name, &row[column]).map_err(refuse)?;
         }
         pair.matches.push(values);
         if let (Some(scores), Some(column)) = (&mut pair.scores, score) {
-            scores.push(number(&here, SCORE, &row[column])?);
+            scores.push(number(SCORE, &row[column]).map_err(refuse)?);
         }
     }
     Ok(pair)
 }
+
+/// What is wrong in a row, with the column where it is in one.
+type Refusal = (Option<&'static str>, Fault);
 
 /// The line that a row stands on. The position of the csv crate is the end of the row before, which blank lines
 /// and one half of `\r\n` may follow.
@@ -80,7 +84,7 @@ fn columns(header: &StringRecord) -> Option<([usize; 4], Option<usize>)> {
     }
 }
 
-fn number(place: &Place, column: &str, field: &str) -> Result<f64, ReadError> {
+fn number(column: &'static str, field: &str) -> Result<f64, Refusal> {
     let value = field.parse::<f64>().ok().filter(|v| v.is_finite());
-    value.ok_or_else(|| place.at_key(column).error(Fault::NotANumber(field.to_owned())))
+    value.ok_or_else(|| (Some(column), Fault::NotANumber(field.to_owned())))
 }

@@ -55,3 +55,30 @@ impl Formatter for Indented {
         writer.write_all(if first { b"" } else { b", " })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Inner {
+        list: Vec<f64>,
+    }
+
+    #[derive(Serialize)]
+    struct Outer {
+        name: &'static str,
+        items: Vec<Inner>,
+        none: Vec<Inner>,
+    }
+
+    #[test]
+    fn lists_of_numbers_stay_on_a_line_and_nothing_is_lost() {
+        let items = vec![Inner { list: vec![1.0, f64::NAN] }, Inner { list: vec![] }];
+        let mut text = Vec::new();
+        write_json(&mut text, &Outer { name: "a", items, none: vec![] }).unwrap();
+        let expected = "{\n  \"name\": \"a\",\n  \"items\": [{\n    \"list\": [1.0, null]\n  }, {\n    \"list\": []\n  \
+                        }],\n  \"none\": []\n}\n";
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+    }
+}

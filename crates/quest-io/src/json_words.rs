@@ -1,10 +1,10 @@
-//! What serde_json says, in this crate's words.
+//! What `serde_json` says, in this crate's words.
 
 use serde_json::error::Category;
 
 use crate::error::{Fault, Place, ReadError};
 
-/// The error of serde_json at `path` in this crate's words.
+/// The error of `serde_json` at `path` in this crate's words.
 pub(crate) fn error(place: &Place, text: &str, path: &str, error: &serde_json::Error) -> ReadError {
     let (line, column) = (error.line().max(1), error.column().max(1));
     let mut here = place.at_line(place.line.unwrap_or(line));

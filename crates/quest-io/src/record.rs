@@ -117,3 +117,50 @@ fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
 fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+    use quest_core::{CandidateKind, RelativePose, correspondence};
+
+    use super::*;
+
+    fn record(t_21: Vector3<f64>, truth: Truth) -> CandidateRecord {
+        let x1 = [[0.0, 0.0], [0.1, 0.0]];
+        let x2 = [[0.0, 0.0], [0.2, 0.1]];
+        let matches = correspondence::from_image_points(&x1, &x2).unwrap();
+        let pose = RelativePose::new(UnitQuaternion::identity(), t_21);
+        let candidate = Candidate { kind: CandidateKind::Exact, pose, residual: 0.0, in_front: 1 };
+        CandidateRecord::new(&candidate, &matches, &truth)
+    }
+
+    #[test]
+    fn depths_that_are_not_determined_are_none() {
+        let moved = record(Vector3::new(1.0, 0.0, 0.0), Truth::default());
+        // The first two rays are parallel.
+        assert_eq!((moved.depths1[0], moved.depths1[1].is_some()), (None, true));
+        let turned = record(Vector3::zeros(), Truth::default());
+        assert_eq!((turned.depths1, turned.depths2), (vec![None; 2], vec![None; 2]));
+    }
+
+    #[test]
+    fn errors_are_there_where_the_truth_is() {
+        let t = Vector3::new(1.0, 0.0, 0.0);
+        let none = record(t, Truth::default());
+        assert_eq!((none.rotation_error_deg, none.translation_error_deg), (None, None));
+        // Also lengths that cannot be squared have a direction.
+        for length in [1e-200, 1.0, 1e200] {
+            let q_21 = Some(UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0_f64.to_radians()));
+            let known = record(t, Truth { q_21, t_21: Some(Vector3::new(0.0, length, 0.0)) });
+            assert!((known.rotation_error_deg.unwrap() - 1.0).abs() < 1e-12);
+            assert!((known.translation_error_deg.unwrap() - 90.0).abs() < 1e-12);
+        }
+        let standing = record(t, Truth { q_21: None, t_21: Some(Vector3::zeros()) });
+        assert_eq!(standing.translation_error_deg, None);
+    }
+
+    #[test]
+    fn feasible_is_all_in_front() {
+        assert!(!record(Vector3::zeros(), Truth::default()).feasible);
+    }
+}
