@@ -24,18 +24,25 @@ Examples:
   quest-cli solve - < pair.json
   quest-cli solve pairs.jsonl -o results.jsonl
 
-Files: JSON, one object a pair: {\"matches\": [[u1, v1, u2, v2], …], \"camera1\": {\"model\": \"PINHOLE\",
-\"width\": 1024, \"height\": 768, \"params\": [1060, 1060, 514, 384]}, \"camera2\": …}, and as wanted
-\"name\", \"scores\", \"q_21\" (w, x, y, z) and \"t_21\" (the truth). JSON Lines: one such object a line.
-CSV: the header u1,v1,u2,v2[,score]. Without cameras the points are on the plane z = 1.
+Files:
+  JSON: one object, a pair. Only \"matches\" is needed; q_21 (w, x, y, z) and t_21 are the truth.
+    {\"name\": \"a\", \"matches\": [[u1, v1, u2, v2], …], \"scores\": […], \"camera1\": {\"model\": \"PINHOLE\",
+     \"width\": 1024, \"height\": 768, \"params\": [1060, 1060, 514, 384]}, \"camera2\": {…},
+     \"q_21\": […], \"t_21\": […]}
+  JSON Lines: one such object a line.
+  CSV: the header u1,v1,u2,v2[,score], one match a row.
+  Without cameras the points are on the plane z = 1.
 
-Results: X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
-A table is the default also in a pipe; JSON Lines give JSON Lines, and the extension of -o counts. Of JSON Lines
-each result is written as soon as it is found, up to the first line that is bad; --format json and -o write
-nothing then.
+Results:
+  X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
+  The format is that of --format, else of the extension of -o, else JSON Lines for JSON
+  Lines, else a table, on a terminal and in a pipe alike.
+  Results of JSON Lines are written one by one up to the first line that is bad; into a
+  file (-o) and as one JSON value (--format json) nothing is written then.
 
-Exit status: 0 an answer, 1 no pose could be found (for JSON Lines: for one pair or more),
-2 bad input or arguments.";
+Exit status:
+  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
+  2 bad input or arguments.";
 
 /// Candidate poses from five or more correct matches.
 #[derive(Args, Debug)]
