@@ -106,12 +106,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 impl Arguments {
     /// Cameras of the command line take the place of the file's.
     fn set_cameras(&self, pair: &mut Pair) -> Result<(), ReadError> {
-        let cameras = match (&self.camera1, &self.camera2, pair.cameras.take()) {
+        let cameras = match (self.camera1, self.camera2, pair.cameras) {
             (None, None, cameras) => cameras,
-            (Some(camera1), camera2, _) => {
-                Some([camera1.clone(), camera2.as_ref().unwrap_or(camera1).clone()])
-            }
-            (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2.clone()]),
+            (Some(camera1), camera2, _) => Some([camera1, camera2.unwrap_or(camera1)]),
+            (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2]),
             (None, Some(_), None) => {
                 return Err(ReadError { place: pair.place.clone(), fault: Fault::FirstCameraMissing });
             }

@@ -5,17 +5,22 @@ use quest_core::{Camera, CameraError, CameraModel};
 /// The camera of COLMAP's model `name` with the parameters in COLMAP's order.
 ///
 /// # Errors
-/// [`CameraError`] for an unknown model, and for parameters that do not fit it.
+/// [`CameraError`] for an unknown model, and for parameters or a size that do not fit it.
 pub fn camera(name: &str, size: Option<(u32, u32)>, params: &[f64]) -> Result<Camera, CameraError> {
-    let _ = (name, size);
-    Camera::new(CameraModel::Pinhole, params)
+    let camera = Camera::new(name.parse::<CameraModel>()?, params)?;
+    match size {
+        Some((width, height)) => camera.with_size(width, height),
+        None => Ok(camera),
+    }
 }
 
-/// The mean focal length in pixels.
-#[must_use]
-pub fn focal_length(camera: &Camera) -> Option<f64> {
-    let [o, u, v] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|p| camera.bearing(p).ok());
-    let (o, u, v) = (o?, u?, v?);
-    let f = 0.5 / (u.x - o.x) + 0.5 / (v.y - o.y);
-    f.is_finite().then_some(f)
+/// The key of a camera that an error is about.
+pub(crate) fn key(error: &CameraError) -> Option<&'static str> {
+    match error {
+        CameraError::UnknownModel { .. } => Some("model"),
+        CameraError::ParameterCount { .. }
+        | CameraError::ParameterNotFinite { .. }
+        | CameraError::FocalLength { .. } => Some("params"),
+        _ => None,
+    }
 }

@@ -11,7 +11,7 @@ use serde::{
 
 use crate::{
     Pair, Truth,
-    camera::camera,
+    camera::{self, camera},
     error::{Fault, Place, ReadError},
     json_words,
 };
@@ -111,11 +111,11 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
 }
 
 fn check(place: &Place, file: PairFile, unknown_keys: Vec<String>) -> Result<Pair, ReadError> {
-    let camera1 = file.camera1.map(|c| c.0.check(&place.at_key("camera1"))).transpose()?;
-    let camera2 = file.camera2.map(|c| c.0.check(&place.at_key("camera2"))).transpose()?;
+    let camera1 = file.camera1.map(|c| c.0.check(place, "camera1")).transpose()?;
+    let camera2 = file.camera2.map(|c| c.0.check(place, "camera2")).transpose()?;
     let cameras = match (camera1, camera2) {
         (None, None) => None,
-        (Some(camera1), camera2) => Some([camera1.clone(), camera2.unwrap_or(camera1)]),
+        (Some(camera1), camera2) => Some([camera1, camera2.unwrap_or(camera1)]),
         (None, Some(_)) => return Err(place.at_key("camera2").error(Fault::FirstCameraMissing)),
     };
     let expected = file.matches.len();
@@ -136,13 +136,16 @@ fn check(place: &Place, file: PairFile, unknown_keys: Vec<String>) -> Result<Pai
 }
 
 impl CameraFile {
-    fn check(self, place: &Place) -> Result<Camera, ReadError> {
+    fn check(self, place: &Place, key: &str) -> Result<Camera, ReadError> {
         let size = match (self.width, self.height) {
             (Some(width), Some(height)) => Some((width, height)),
             (None, None) => None,
-            _ => return Err(place.clone().error(Fault::HalfASize)),
+            _ => return Err(place.at_key(key).error(Fault::HalfASize)),
         };
-        camera(&self.model, size, &self.params).map_err(|e| place.clone().error(e))
+        camera(&self.model, size, &self.params).map_err(|error| {
+            let part = camera::key(&error).map(|part| format!(".{part}")).unwrap_or_default();
+            place.at_key(format!("{key}{part}")).error(error)
+        })
     }
 }
 

@@ -28,7 +28,7 @@ mod pair;
 mod read;
 mod record;
 
-pub use camera::{camera, focal_length};
+pub use camera::camera;
 pub use error::{Fault, Place, ReadError};
 pub use json_text::write_json;
 pub use output::{Output, WriteError};

@@ -3,10 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use quest_core::{Camera, Correspondence, InputError, RelativePose, correspondence};
 
-use crate::{
-    camera::focal_length,
-    error::{Place, ReadError},
-};
+use crate::error::{Place, ReadError};
 
 /// The matches of two images, with what is known of the cameras and of the true pose.
 #[derive(Clone, Debug, Default)]
@@ -65,8 +62,8 @@ impl Pair {
     /// The mean focal length of the two cameras in pixels, `None` without cameras.
     #[must_use]
     pub fn focal_length(&self) -> Option<f64> {
-        let [camera1, camera2] = self.cameras.as_ref()?;
-        Some(0.5 * (focal_length(camera1)? + focal_length(camera2)?))
+        let lengths = self.cameras?.map(|camera| camera.focal_lengths());
+        Some(lengths.iter().map(|(fx, fy)| fx + fy).sum::<f64>() / 4.0)
     }
 }
 

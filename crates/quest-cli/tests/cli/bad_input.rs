@@ -88,6 +88,15 @@ fn cameras_that_are_not_understood() {
     let file = |camera: &str| format!(r#"{{"matches": [], "camera1": {camera}}}"#);
     let half = "a.json: camera1: found one of width and height, expected both or none";
     refused("a.json", file(r#"{"model": "PINHOLE", "width": 9, "params": [1, 1, 0, 0]}"#), half);
+    let names = "SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV, \
+                 SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE";
+    let unknown = format!("a.json: camera1.model: unknown camera model \"FISH\", expected one of {names}");
+    refused("a.json", file(r#"{"model": "FISH", "params": [1, 1, 0, 0]}"#), &unknown);
+    let count = "a.json: camera1.params: PINHOLE takes 4 parameters (fx, fy, cx, cy), found 3";
+    refused("a.json", file(r#"{"model": "PINHOLE", "params": [1, 0, 0]}"#), count);
+    let focal =
+        "a.json: camera1.params: focal length fx of the camera is 0 pixels, expected a positive number";
+    refused("a.json", file(r#"{"model": "PINHOLE", "params": [0, 1, 0, 0]}"#), focal);
     let list = "a.json:1:27: camera1: found a list, expected an object";
     refused("a.json", file(r#"["PINHOLE", 9, 9, [1, 1, 0, 0]]"#), list);
     let second = "a.json: camera2: found a second camera without the first, expected camera1 as well";
