@@ -32,7 +32,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Solve(solve::Arguments),
+    Solve(Box<solve::Arguments>),
     Solvers(solvers::Arguments),
 }
 

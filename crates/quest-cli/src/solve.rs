@@ -111,7 +111,7 @@ impl Arguments {
             (Some(camera1), camera2, _) => Some([camera1, camera2.unwrap_or(camera1)]),
             (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2]),
             (None, Some(_), None) => {
-                return Err(ReadError { place: pair.place.clone(), fault: Fault::FirstCameraMissing });
+                return Err(pair.place.clone().error(Fault::FirstCameraMissing));
             }
         };
         pair.cameras = cameras;

@@ -37,8 +37,9 @@ impl Place {
     }
 
     /// The error that `fault` is in this place.
-    pub(crate) fn error(self, fault: impl Into<Fault>) -> ReadError {
-        ReadError { place: self, fault: fault.into() }
+    #[must_use]
+    pub fn error(self, fault: impl Into<Fault>) -> ReadError {
+        ReadError { place: self, fault: Box::new(fault.into()) }
     }
 }
 
@@ -62,7 +63,7 @@ pub struct ReadError {
     /// Where.
     pub place: Place,
     /// What was found, and what was expected.
-    pub fault: Fault,
+    pub fault: Box<Fault>,
 }
 
 /// What is wrong with a file.
