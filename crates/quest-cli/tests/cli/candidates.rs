@@ -33,7 +33,7 @@ fn coincident() -> Value {
 /// A file with these matches, solved.
 fn solve_matches(matches: &Value, arguments: &[&str]) -> Run {
     let text = json!({ "matches": matches }).to_string();
-    run_in(Path::new("."), &[&["solve", "-"], arguments].concat(), text.as_bytes())
+    run_in(Path::new("."), &[&["solve", "-", "--solver", "quest-eigen"], arguments].concat(), text.as_bytes())
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn one_pair_without_a_pose_among_others_is_told_by_the_exit_status() {
 
 #[test]
 fn the_table_shows_what_is_known() {
-    let table = run(&["solve", &example("points.json")]).stdout;
+    let table = run(&["solve", &example("points.json"), "--solver", "quest-eigen"]).stdout;
     assert!(table.starts_with("points: 5 matches, solver quest-eigen\n\n#  kind "), "{table}");
     assert!(table.contains("t error") && !table.contains("px"), "{table}");
     let row = table.lines().find(|line| line.contains("0.3000 -0.1000  0.2000")).unwrap();
