@@ -1,3 +1,68 @@
 //! `quest-cli`: candidate poses from matched points.
+//!
+//! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
-fn main() {}
+mod candidate_table;
+mod options;
+mod rows;
+mod solve;
+mod solvers;
+mod table;
+mod words;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+const EXAMPLES: &str = "\
+Examples:
+  quest-cli solve examples/points.json             a table of the candidate poses
+  quest-cli solve --format json pair.json | jq     the same for programs
+  quest-cli solvers                                the solvers to choose from
+
+Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
+
+/// Camera relative pose from matched image points.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Solve(Box<solve::Arguments>),
+    Solvers(solvers::Arguments),
+}
+
+/// What the exit status says of a run that went well.
+enum Outcome {
+    Answer,
+    NoPose,
+}
+
+/// Bad input or arguments, or a result that could not be written.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Read(#[from] quest_io::ReadError),
+    #[error(transparent)]
+    Write(#[from] quest_io::WriteError),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Solve(arguments) => solve::run(&arguments),
+        Command::Solvers(arguments) => solvers::run(&arguments),
+    };
+    match result {
+        Ok(Outcome::Answer) => ExitCode::SUCCESS,
+        Ok(Outcome::NoPose) => ExitCode::from(1),
+        Err(Failure::Write(error)) if error.is_broken_pipe() => ExitCode::SUCCESS,
+        Err(failure) => {
+            words::say("error", &failure.to_string());
+            ExitCode::from(2)
+        }
+    }
+}

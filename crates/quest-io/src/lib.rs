@@ -1,1 +1,37 @@
-//! Placeholder of the skeleton.
+//! The files of `quest-cli` and its companions: image pairs in, results out.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! for pair in quest_io::read(Path::new("pair.json"), None)? {
+//!     let pair = pair?;
+//!     let matches = pair.correspondences()?;
+//!     println!("{}: {} matches", pair.place, matches.len());
+//! }
+//! # Ok::<(), quest_io::ReadError>(())
+//! ```
+//!
+//! - [`read`] opens a file or standard input and yields [`Pair`]s; what is wrong with a file is a
+//!   [`ReadError`]: one line with the place, what was found and what was expected.
+//! - [`SolveRecord`] is the result of a solve as it stands in files.
+//! - [`Output`] writes a file whole or not at all; [`write_json`] writes JSON for people.
+#![forbid(unsafe_code)]
+
+mod camera;
+mod csv_file;
+mod error;
+mod json_file;
+mod json_text;
+mod json_words;
+mod output;
+mod pair;
+mod read;
+mod record;
+
+pub use camera::camera;
+pub use error::{Fault, Place, ReadError};
+pub use json_text::write_json;
+pub use output::{Output, WriteError};
+pub use pair::{Pair, Truth};
+pub use read::{Format, Pairs, STANDARD_INPUT, read};
+pub use record::{CandidateRecord, SolveRecord};

@@ -1,0 +1,100 @@
+//! Options that subcommands share.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use quest_core::{Camera, solver::SolverName};
+use quest_io::{Output, WriteError};
+
+/// How a result is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// For people.
+    Table,
+    /// One JSON value, indented.
+    Json,
+    /// One JSON object a line.
+    Jsonl,
+    /// A header and one row each.
+    Csv,
+}
+
+/// How a file is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum InputFormat {
+    /// One JSON object.
+    Json,
+    /// One JSON object a line.
+    Jsonl,
+    /// `u1,v1,u2,v2[,score]`, one match a row.
+    Csv,
+}
+
+impl From<InputFormat> for quest_io::Format {
+    fn from(format: InputFormat) -> Self {
+        match format {
+            InputFormat::Json => Self::Json,
+            InputFormat::Jsonl => Self::JsonLines,
+            InputFormat::Csv => Self::Csv,
+        }
+    }
+}
+
+/// Where a result goes, and how.
+#[derive(Args, Debug)]
+pub(crate) struct OutputOptions {
+    /// How the result is written [default: after the extension of -o, else as the input, else a table].
+    #[arg(long, value_enum, hide_default_value = true)]
+    format: Option<Format>,
+    /// Write the result to this file, whole or not at all.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Say nothing on standard error but errors and why there is no pose.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl OutputOptions {
+    /// The format asked for, else that of the output's extension, else `default`. Whether standard output is a
+    /// terminal plays no part: what is seen there is what a pipe gets.
+    pub(crate) fn format(&self, default: Format) -> Format {
+        let extension = || quest_io::Format::from_extension(self.output.as_ref()?);
+        self.format.unwrap_or_else(|| match extension() {
+            Some(quest_io::Format::Json) => Format::Json,
+            Some(quest_io::Format::JsonLines) => Format::Jsonl,
+            Some(quest_io::Format::Csv) => Format::Csv,
+            None => default,
+        })
+    }
+
+    /// The target, found writable.
+    pub(crate) fn open(&self) -> Result<Output, WriteError> {
+        Output::open(self.output.as_deref().map(Path::new))
+    }
+}
+
+/// `MODEL,width,height,params…` as a camera.
+pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
+    const EXPECTED: &str = "expected MODEL,width,height,params such as PINHOLE,1024,768,1060,1060,514,384";
+    let mut parts = text.split(',').map(str::trim);
+    let (Some(model), Some(width), Some(height)) = (parts.next(), parts.next(), parts.next()) else {
+        return Err(format!("found {} values, {EXPECTED}", text.split(',').count()));
+    };
+    let size = |field: &str| {
+        field.parse::<u32>().map_err(|_| format!("found {field:?} for the width or height, {EXPECTED}"))
+    };
+    let size = (size(width)?, size(height)?);
+    let number = |field: &str| {
+        let value = field.parse::<f64>().ok().filter(|v| v.is_finite());
+        value.ok_or_else(|| format!("found the parameter {field:?}, expected a finite number"))
+    };
+    let params = parts.map(number).collect::<Result<Vec<_>, _>>()?;
+    quest_io::camera(model, Some(size), &params).map_err(|error| format!("{error}; {EXPECTED}"))
+}
+
+/// A solver by its name, with the names listed in the help.
+pub(crate) fn solver_parser() -> impl clap::builder::TypedValueParser<Value = SolverName> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    PossibleValuesParser::new(SolverName::ALL.map(|s| s.info().name))
+        .try_map(|name| name.parse::<SolverName>())
+}

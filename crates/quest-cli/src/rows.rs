@@ -1,0 +1,86 @@
+//! Results as lines of JSON and rows of CSV.
+
+use std::io::{self, Write};
+
+use quest_io::{CandidateRecord, SolveRecord};
+use serde::Serialize;
+
+/// One line of JSON.
+pub(crate) fn write_line<T: Serialize>(writer: &mut dyn Write, record: &T) -> io::Result<()> {
+    // In one piece, so that a reader of the pipe never sees half a line.
+    let mut line = serde_json::to_vec(record)?;
+    line.push(b'\n');
+    writer.write_all(&line)
+}
+
+/// A header and one row of CSV for each record.
+pub(crate) fn write_csv<T: Serialize>(writer: &mut dyn Write, records: &[T]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(writer);
+    records.iter().try_for_each(|record| csv.serialize(record)).map_err(io::Error::from)?;
+    csv.flush()
+}
+
+/// The columns of [`write_candidates`]. The depths, which differ in number, are left to JSON.
+const COLUMNS: [&str; 18] = [
+    "pair",
+    "name",
+    "solver",
+    "candidate",
+    "kind",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "tx",
+    "ty",
+    "tz",
+    "residual",
+    "in_front",
+    "matches",
+    "feasible",
+    "rotation_error_deg",
+    "translation_error_deg",
+];
+
+/// One row of CSV for each candidate of the pair with number `pair`, counted from one; the first pair brings
+/// the header.
+pub(crate) fn write_candidates(writer: &mut dyn Write, pair: usize, record: &SolveRecord) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(writer);
+    if pair == 1 {
+        csv.write_record(COLUMNS)?;
+    }
+    for (index, candidate) in record.candidates.iter().enumerate() {
+        csv.write_record(row(pair, index + 1, record, candidate))?;
+    }
+    csv.flush()
+}
+
+fn row(pair: usize, number: usize, record: &SolveRecord, c: &CandidateRecord) -> [String; COLUMNS.len()] {
+    let ([qw, qx, qy, qz], [tx, ty, tz]) = (c.q_21.map(text), c.t_21.map(text));
+    let error = |e: Option<f64>| e.map(text).unwrap_or_default();
+    [
+        pair.to_string(),
+        record.name.clone().unwrap_or_default(),
+        record.solver.to_owned(),
+        number.to_string(),
+        c.kind.to_owned(),
+        qw,
+        qx,
+        qy,
+        qz,
+        tx,
+        ty,
+        tz,
+        text(c.residual),
+        c.in_front.to_string(),
+        record.matches.to_string(),
+        c.feasible.to_string(),
+        error(c.rotation_error_deg),
+        error(c.translation_error_deg),
+    ]
+}
+
+/// All digits, with an exponent where it is shorter; nothing for what is not a number.
+fn text(x: f64) -> String {
+    if x.is_finite() { format!("{x:?}") } else { String::new() }
+}

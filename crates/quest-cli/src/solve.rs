@@ -1,0 +1,215 @@
+//! `quest-cli solve`: candidate poses from five or more correct matches.
+
+use std::{collections::HashSet, path::PathBuf};
+
+use clap::{Args, ValueEnum};
+use quest_core::{
+    Camera, Candidates, InputError,
+    solver::{Kinds, SolverName},
+};
+use quest_io::{Fault, Output, Pair, ReadError, SolveRecord, WriteError};
+
+use crate::{
+    Failure, Outcome, candidate_table,
+    options::{Format, InputFormat, OutputOptions, parse_camera, solver_parser},
+    rows, words,
+};
+
+const EXAMPLES: &str = "\
+Examples:
+  quest-cli solve examples/points.json
+  quest-cli solve examples/points.json --all --kinds exact
+  quest-cli solve examples/points.csv --format json
+  quest-cli solve pixels.csv --camera1 PINHOLE,1024,768,1060,1060,514,384
+  quest-cli solve - < pair.json
+  quest-cli solve pairs.jsonl -o results.jsonl
+
+Files:
+  JSON: one object, a pair. Only \"matches\" is needed; q_21 (w, x, y, z) and t_21 are the truth.
+    {\"name\": \"a\", \"matches\": [[u1, v1, u2, v2], …], \"scores\": […], \"camera1\": {\"model\": \"PINHOLE\",
+     \"width\": 1024, \"height\": 768, \"params\": [1060, 1060, 514, 384]}, \"camera2\": {…},
+     \"q_21\": […], \"t_21\": […]}
+  JSON Lines: one such object a line.
+  CSV: the header u1,v1,u2,v2[,score], one match a row.
+  Without cameras the points are on the plane z = 1.
+
+Results:
+  X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
+  The format is that of --format, else of the extension of -o, else JSON Lines for JSON
+  Lines, else a table, on a terminal and in a pipe alike.
+  Results of JSON Lines are written one by one up to the first line that is bad; into a
+  file (-o) and as one JSON value (--format json) nothing is written then.
+
+Exit status:
+  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
+  2 bad input or arguments.";
+
+/// Candidate poses from five or more correct matches.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    /// The matches: .json, .jsonl or .csv; `-` is standard input.
+    file: PathBuf,
+    /// The solver; `quest-cli solvers` describes them.
+    #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
+    solver: SolverName,
+    /// Which candidates are computed: also real parts of complex solutions and the rotation alone, or not.
+    #[arg(long, value_enum, default_value_t = KindsArgument::All)]
+    kinds: KindsArgument,
+    /// List also the candidates that have points behind a camera.
+    #[arg(long)]
+    all: bool,
+    /// The camera of view 1, and of view 2 where it has none of its own. Takes the place of the file's.
+    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
+    camera1: Option<Camera>,
+    /// The camera of view 2. Takes the place of the file's.
+    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
+    camera2: Option<Camera>,
+    /// The form of the input [default: after its extension, else after its beginning].
+    #[arg(long, value_enum, hide_default_value = true)]
+    input_format: Option<InputFormat>,
+    #[command(flatten)]
+    output: OutputOptions,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum KindsArgument {
+    All,
+    Exact,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let pairs = quest_io::read(&arguments.file, arguments.input_format.map(Into::into))?;
+    let is_lines = pairs.format() == quest_io::Format::JsonLines;
+    let format = arguments.output.format(if is_lines { Format::Jsonl } else { Format::Table });
+    let mut writer = Writer { output: arguments.output.open()?, format, pairs: 0, kept: Vec::new() };
+    let mut told = HashSet::new();
+    let mut outcome = Outcome::Answer;
+    for pair in pairs {
+        let mut pair = pair?;
+        pair.unknown_keys.retain(|key| told.insert(key.clone()));
+        if !pair.unknown_keys.is_empty() && !arguments.output.quiet {
+            words::say(
+                "warning",
+                &format!("{}: ignored unknown keys: {}", pair.place, pair.unknown_keys.join(", ")),
+            );
+        }
+        arguments.set_cameras(&mut pair)?;
+        if let Outcome::NoPose = one_pair(arguments, &pair, &mut writer)? {
+            outcome = Outcome::NoPose;
+        }
+    }
+    writer.finish(is_lines)?;
+    Ok(outcome)
+}
+
+impl Arguments {
+    /// Cameras of the command line take the place of the file's.
+    fn set_cameras(&self, pair: &mut Pair) -> Result<(), ReadError> {
+        let cameras = match (self.camera1, self.camera2, pair.cameras) {
+            (None, None, cameras) => cameras,
+            (Some(camera1), camera2, _) => Some([camera1, camera2.unwrap_or(camera1)]),
+            (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2]),
+            (None, Some(_), None) => {
+                return Err(pair.place.clone().error(Fault::FirstCameraMissing));
+            }
+        };
+        pair.cameras = cameras;
+        Ok(())
+    }
+}
+
+fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<Outcome, Failure> {
+    let info = arguments.solver.info();
+    let matches = pair.correspondences()?;
+    if matches.len() < info.min_matches {
+        let error = InputError::TooFewMatches { found: matches.len(), needed: info.min_matches };
+        return Err(pair.refuse(error).into());
+    }
+    let mut found = Candidates::new();
+    let kinds = match arguments.kinds {
+        KindsArgument::All => Kinds::All,
+        KindsArgument::Exact => Kinds::Exact,
+    };
+    arguments.solver.solve(kinds, &matches, &mut found);
+
+    let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
+    let most_in_front = record.candidates.iter().map(|c| c.in_front).max();
+    let hidden = if arguments.all { 0 } else { record.drop_unfeasible() };
+    let heading = heading(pair, &record, found.degeneracy().map(words::degeneracy));
+    let is_empty = record.candidates.is_empty();
+    writer.write(&heading, record, pair.focal_length())?;
+
+    if is_empty {
+        let why = match (most_in_front, found.degeneracy()) {
+            (Some(most), _) => format!(
+                "none of the {hidden} candidates has all {} points in front of both cameras, the best has {most}; \
+                 --all lists them",
+                matches.len()
+            ),
+            (None, Some(degeneracy)) => words::degeneracy(degeneracy).to_owned(),
+            (None, None) => "the solver found no candidate".to_owned(),
+        };
+        words::say("no pose", &format!("{}: {why}", pair.place));
+        return Ok(Outcome::NoPose);
+    }
+    if hidden > 0 && !arguments.output.quiet {
+        let what = if hidden == 1 { "candidate with points" } else { "candidates with points" };
+        words::say(
+            "note",
+            &format!("{}: {hidden} {what} behind a camera not listed, --all lists them", pair.place),
+        );
+    }
+    Ok(Outcome::Answer)
+}
+
+/// The line above the table.
+fn heading(pair: &Pair, record: &SolveRecord, degeneracy: Option<&str>) -> String {
+    let name = record.name.clone().unwrap_or_else(|| pair.place.to_string());
+    let degeneracy = degeneracy.map(|words| format!(", {words}")).unwrap_or_default();
+    words::one_line(&format!("{name}: {} matches, solver {}{degeneracy}", record.matches, record.solver))
+}
+
+/// Writes results in the format asked for.
+struct Writer {
+    output: Output,
+    format: Format,
+    /// How many results there were.
+    pairs: usize,
+    /// The results of `--format json`, which are one value.
+    kept: Vec<SolveRecord>,
+}
+
+impl Writer {
+    fn write(&mut self, heading: &str, record: SolveRecord, focal: Option<f64>) -> Result<(), WriteError> {
+        self.pairs += 1;
+        let is_first = self.pairs == 1;
+        match self.format {
+            Format::Json => {
+                self.kept.push(record);
+                Ok(())
+            }
+            Format::Jsonl => self.output.write(|w| rows::write_line(w, &record)),
+            Format::Csv => self.output.write(|w| rows::write_candidates(w, self.pairs, &record)),
+            Format::Table => self.output.write(|w| {
+                writeln!(w, "{}{heading}", if is_first { "" } else { "\n" })?;
+                if record.candidates.is_empty() {
+                    return Ok(());
+                }
+                writeln!(w, "\n{}", candidate_table::text(&record, focal))
+            }),
+        }
+    }
+
+    /// One pair is one JSON object, JSON Lines are a list of them.
+    fn finish(mut self, is_list: bool) -> Result<(), WriteError> {
+        if self.format == Format::Json {
+            let kept = &self.kept;
+            self.output.write(|w| match kept.as_slice() {
+                [one] if !is_list => quest_io::write_json(w, one),
+                all => quest_io::write_json(w, all),
+            })?;
+        }
+        self.output.finish()
+    }
+}

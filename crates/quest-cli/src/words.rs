@@ -1,0 +1,52 @@
+//! What is said on standard error.
+
+use std::io::{self, Write};
+
+use quest_core::Degeneracy;
+
+/// Longer lines are cut: a message may quote what it found in a file.
+const LONGEST: usize = 400;
+
+/// Writes `kind: text` as one line. Standard error that is closed or full is no reason to fail.
+pub(crate) fn say(kind: &str, text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{kind}: {}", one_line(text));
+}
+
+/// The text on one line of bounded length, control characters made visible.
+pub(crate) fn one_line(text: &str) -> String {
+    let mut line = String::new();
+    for c in text.chars() {
+        if line.len() > LONGEST {
+            line.push('…');
+            break;
+        }
+        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
+}
+
+/// What a degeneracy means.
+pub(crate) fn degeneracy(degeneracy: Degeneracy) -> &'static str {
+    match degeneracy {
+        Degeneracy::TooFewMatches => "there are fewer matches than the solver needs",
+        Degeneracy::Coincident => "all points coincide in one view",
+        Degeneracy::Duplicate => "matches are repeated, and too few distinct ones are left",
+        Degeneracy::Collinear => "too many of the points lie on a line",
+        Degeneracy::RankDeficient => "the matches do not give five independent constraints",
+        Degeneracy::PureRotation => {
+            "pure rotation: a rotation alone explains the matches, there is no translation and no depth"
+        }
+        other => other.name(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_stays_on_one_line() {
+        assert_eq!(one_line("a\nb\u{1b}[31m"), "a\\nb\\u{1b}[31m");
+        assert!(one_line(&"x".repeat(10_000)).len() < LONGEST + 10);
+    }
+}

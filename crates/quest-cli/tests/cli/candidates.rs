@@ -1,0 +1,189 @@
+//! The answers of `solve`.
+
+use serde_json::{Value, json};
+
+use super::*;
+
+#[track_caller]
+fn solved(arguments: &[&str]) -> (Run, Value) {
+    let run = run(&[&["solve", "--format", "json"], arguments].concat());
+    let result = serde_json::from_str(&run.stdout).unwrap();
+    (run, result)
+}
+
+fn candidates(result: &Value) -> &[Value] {
+    result["candidates"].as_array().unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// Matches that coincide in view 1.
+fn coincident() -> Value {
+    json!([
+        [0.1, 0.1, 0.1, 0.2],
+        [0.1, 0.1, 0.2, 0.1],
+        [0.1, 0.1, 0.3, 0.5],
+        [0.1, 0.1, 0.4, 0.3],
+        [0.1, 0.1, 0.2, 0.4]
+    ])
+}
+
+/// A file with these matches, solved.
+fn solve_matches(matches: &Value, arguments: &[&str]) -> Run {
+    let text = json!({ "matches": matches }).to_string();
+    run_in(Path::new("."), &[&["solve", "-", "--solver", "quest-eigen"], arguments].concat(), text.as_bytes())
+}
+
+#[test]
+fn the_planted_pose_is_found_with_its_length() {
+    let (run, result) = solved(&[&example("points.json")]);
+    assert_eq!((run.status, &result["degeneracy"]), (0, &Value::Null));
+    let error = |c: &Value, key: &str| c[key].as_f64().unwrap();
+    let found = candidates(&result)
+        .iter()
+        .find(|c| error(c, "rotation_error_deg") < 1e-6 && error(c, "translation_error_deg") < 1e-6)
+        .unwrap();
+    assert_eq!(
+        (&found["kind"], &found["in_front"], &found["feasible"]),
+        (&json!("exact"), &json!(5), &json!(true))
+    );
+    assert!(found["residual"].as_f64().unwrap() < 1e-12);
+    // The planted translation has the length that solvers give it.
+    for (t, truth) in numbers(&found["t_21"]).iter().zip([0.3, -0.1, 0.2]) {
+        assert!((t - truth).abs() < 1e-9);
+    }
+    let depths = [numbers(&found["depths1"]), numbers(&found["depths2"])].concat();
+    assert_eq!(depths.len(), 10);
+    assert!((depths.iter().sum::<f64>() / 10.0 - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_real_pair_is_solved_through_its_cameras() {
+    let (run, result) = solved(&[&example("tiny_berlin_7in.json")]);
+    assert_eq!(run.status, 0);
+    let best = &candidates(&result)[0];
+    assert!(best["rotation_error_deg"].as_f64().unwrap() < 0.5);
+    assert!(best["translation_error_deg"].as_f64().unwrap() < 2.0);
+}
+
+#[test]
+fn cameras_may_come_from_the_command_line() {
+    let file: Value = serde_json::from_slice(&fs::read(example("tiny_berlin_7in.json")).unwrap()).unwrap();
+    let rows = file["matches"].as_array().unwrap();
+    let rows: Vec<_> =
+        rows.iter().map(|m| numbers(m).iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
+    let directory = directory_with("pixels.csv", format!("u1,v1,u2,v2\n{}\n", rows.join("\n")));
+    let camera = "PINHOLE,1306,979,1135.435732,1135.435732,652.3,489.1";
+    let arguments = ["solve", "pixels.csv", "--format", "json", "--camera1", camera];
+    let run = run_in(directory.path(), &arguments, b"");
+    let from_csv: Value = serde_json::from_str(&run.stdout).unwrap();
+    let (_, from_json) = solved(&[&example("tiny_berlin_7in.json")]);
+    assert_eq!(candidates(&from_csv)[0]["t_21"], candidates(&from_json)[0]["t_21"]);
+}
+
+#[test]
+fn candidates_behind_a_camera_are_listed_on_demand() {
+    let file = example("points.json");
+    let (few, result) = solved(&[&file]);
+    assert!(candidates(&result).iter().all(|c| c["feasible"] == true));
+    let (all, everything) = solved(&[&file, "--all"]);
+    let hidden = candidates(&everything).iter().filter(|c| c["feasible"] == false).count();
+    assert_eq!(candidates(&everything).len(), candidates(&result).len() + hidden);
+    let note = format!(
+        "note: {file}: {hidden} candidates with points behind a camera not listed, --all lists them\n"
+    );
+    assert_eq!((few.stderr, all.stderr), (note, String::new()));
+    assert_eq!(run(&["solve", &file, "--quiet"]).stderr, "");
+}
+
+#[test]
+fn only_candidates_behind_a_camera_are_no_answer() {
+    // Some of these matches are false: no pose has all of the points in front.
+    let file = example("hololens_00011_00015.json");
+    let (run, result) = solved(&[&file, "--quiet"]);
+    assert_eq!((run.status, candidates(&result).len()), (1, 0));
+    let start = format!("no pose: {file}: none of the ");
+    assert!(run.stderr.starts_with(&start) && run.stderr.ends_with("; --all lists them\n"), "{}", run.stderr);
+    let (run, result) = solved(&[&file, "--quiet", "--all"]);
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    assert!(!candidates(&result).is_empty());
+}
+
+#[test]
+fn kinds_exact_leaves_the_other_kinds_out() {
+    let file = example("points.json");
+    let kinds = |result: &Value| candidates(result).iter().map(|c| c["kind"].to_string()).collect::<Vec<_>>();
+    assert!(kinds(&solved(&[&file, "--all"]).1).contains(&"\"rotation_only\"".to_owned()));
+    assert!(kinds(&solved(&[&file, "--all", "--kinds", "exact"]).1).iter().all(|k| k == "\"exact\""));
+}
+
+#[test]
+fn matches_without_a_pose() {
+    let coincident = coincident();
+    let run = solve_matches(&coincident, &[]);
+    assert_eq!(run.stderr, "no pose: standard input: all points coincide in one view\n");
+    let heading = "standard input: 5 matches, solver quest-eigen, all points coincide in one view\n";
+    assert_eq!((run.status, run.stdout.as_str()), (1, heading));
+
+    let run = solve_matches(&coincident, &["--format", "json", "--quiet"]);
+    let result: Value = serde_json::from_str(&run.stdout).unwrap();
+    let expected =
+        json!({ "solver": "quest-eigen", "matches": 5, "degeneracy": "coincident", "candidates": [] });
+    assert_eq!((run.status, result), (1, expected));
+}
+
+#[test]
+fn a_pure_rotation_has_a_rotation_and_no_depths() {
+    let same = json!([
+        [0.1, 0.1, 0.1, 0.1],
+        [0.4, 0.1, 0.4, 0.1],
+        [-0.3, 0.2, -0.3, 0.2],
+        [0.2, -0.3, 0.2, -0.3],
+        [0.0, 0.4, 0.0, 0.4]
+    ]);
+    let run = solve_matches(&same, &["--format", "json"]);
+    let result: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!((run.status, &result["degeneracy"]), (0, &json!("pure_rotation")));
+    let candidate = &candidates(&result)[0];
+    assert_eq!(
+        (&candidate["q_21"], &candidate["t_21"]),
+        (&json!([1.0, 0.0, 0.0, 0.0]), &json!([0.0, 0.0, 0.0]))
+    );
+    assert_eq!(candidate["depths1"], json!([null, null, null, null, null]));
+    let table = solve_matches(&same, &[]).stdout;
+    assert!(table.starts_with("standard input: 5 matches, solver quest-eigen, pure rotation: "), "{table}");
+}
+
+#[test]
+fn one_pair_without_a_pose_among_others_is_told_by_the_exit_status() {
+    let lines = format!("{{\"matches\": {}}}\n{{\"matches\": {}}}\n", five_matches(), coincident());
+    let run = run_in(Path::new("."), &["solve", "-", "--quiet"], lines.as_bytes());
+    assert_eq!((run.status, run.stdout.lines().count()), (1, 2));
+    assert!(run.stderr.starts_with("no pose: standard input:2: "), "{}", run.stderr);
+}
+
+#[test]
+fn the_table_shows_what_is_known() {
+    let table = run(&["solve", &example("points.json"), "--solver", "quest-eigen"]).stdout;
+    assert!(table.starts_with("points: 5 matches, solver quest-eigen\n\n#  kind "), "{table}");
+    assert!(table.contains("t error") && !table.contains("px"), "{table}");
+    let row = table.lines().find(|line| line.contains("0.3000 -0.1000  0.2000")).unwrap();
+    assert!(row.contains("exact") && row.contains("15.000") && row.contains("5/5"), "{row}");
+    let table = run(&["solve", &example("points.csv")]).stdout;
+    assert!(!table.contains("error"), "{table}");
+    let table = run(&["solve", &example("tiny_berlin_7in.json")]).stdout;
+    assert!(table.contains("px"), "{table}");
+}
+
+#[test]
+fn csv_has_a_row_for_each_candidate() {
+    let file = example("points.json");
+    let count = candidates(&solved(&[&file, "--all"]).1).len();
+    let csv = run(&["solve", &file, "--all", "--format", "csv"]).stdout;
+    assert_eq!(csv.lines().count(), count + 1);
+    assert!(csv.starts_with("pair,name,solver,candidate,kind,qw,qx,qy,qz,tx,ty,tz,residual,"));
+    let columns = csv.lines().next().unwrap().split(',').count();
+    assert!(csv.lines().all(|line| line.split(',').count() == columns));
+}

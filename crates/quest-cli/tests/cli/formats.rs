@@ -1,0 +1,114 @@
+//! Forms of input, and words beside the result.
+
+use super::*;
+
+/// The result as JSON, whatever the exit status says of candidates.
+#[track_caller]
+fn json(arguments: &[&str], input: &str) -> serde_json::Value {
+    let run = run_in(Path::new("."), &[&["solve", "--format", "json"], arguments].concat(), input.as_bytes());
+    serde_json::from_str(&run.stdout).unwrap_or_else(|e| panic!("{e}: {run:?}"))
+}
+
+fn pair(extra: &str) -> String {
+    format!("{{\"matches\": {}{extra}}}", five_matches())
+}
+
+#[test]
+fn every_form_gives_the_same_candidates() {
+    let from_json = json(&[&example("points.json")], "");
+    assert_eq!(from_json["name"], "points");
+    assert_eq!(from_json["matches"], 5);
+    let csv = fs::read_to_string(example("points.csv")).unwrap();
+    let forms = [
+        json(&["-"], &fs::read_to_string(example("points.json")).unwrap()),
+        json(&[&example("points.csv")], ""),
+        json(&["-"], &csv),
+        json(&["-", "--input-format", "csv"], &csv),
+        json(&["-"], &format!("\u{feff}{}", csv.replace('\n', "\r\n"))),
+        json(&["-", "--input-format", "jsonl"], &pair(""))[0].clone(),
+    ];
+    for form in forms {
+        let candidates = |v: &serde_json::Value| v["candidates"].as_array().unwrap().len();
+        assert_eq!(candidates(&form), candidates(&from_json));
+        for (a, b) in
+            form["candidates"].as_array().unwrap().iter().zip(from_json["candidates"].as_array().unwrap())
+        {
+            assert_eq!((&a["q_21"], &a["t_21"]), (&b["q_21"], &b["t_21"]));
+        }
+    }
+}
+
+#[test]
+fn json_lines_give_a_line_each() {
+    let lines = format!("{}\n\n{}\n", pair(", \"name\": \"a\""), pair(", \"name\": \"b\""));
+    let run = run_in(Path::new("."), &["solve", "-"], lines.as_bytes());
+    let names: Vec<_> = run
+        .stdout
+        .lines()
+        .map(|line| {
+            serde_json::from_str::<serde_json::Value>(line).unwrap()["name"].as_str().unwrap().to_owned()
+        })
+        .collect();
+    assert_eq!(names, ["a", "b"]);
+    assert_eq!(json(&["-"], &lines).as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn results_before_a_bad_line_are_written() {
+    let lines = format!("{}\n\n{{\"matches\": [[1, 2, 3]]}}\n{}\n", pair(""), pair(""));
+    let run = run_in(Path::new("."), &["solve", "-", "--quiet"], lines.as_bytes());
+    assert_eq!((run.status, run.stdout.lines().count()), (2, 1));
+    let error = "error: standard input:3:22: matches[0]: found 3 numbers, expected 4";
+    assert_eq!(run.stderr.lines().last(), Some(error));
+}
+
+#[test]
+fn unknown_keys_are_named_once() {
+    let keys = ", \"source\": 1, \"camera1\": {\"model\": \"PINHOLE\", \"params\": [1, 1, 0, 0], \"fov\": 3}";
+    let lines = format!("{}\n{}\n", pair(keys), pair(keys));
+    let words = run_in(Path::new("."), &["solve", "-"], lines.as_bytes()).stderr;
+    let warnings: Vec<_> = words.lines().filter(|l| l.starts_with("warning:")).collect();
+    assert_eq!(warnings, ["warning: standard input:1: ignored unknown keys: source, camera1.fov"]);
+    let quiet = run_in(Path::new("."), &["solve", "-", "--quiet"], lines.as_bytes());
+    assert!(!quiet.stderr.contains("warning") && !quiet.stderr.contains("note"), "{}", quiet.stderr);
+}
+
+#[test]
+fn columns_of_csv_are_found_by_name() {
+    let text = "score,v2,u2,v1,u1,tag\n1,0.4,0.3,0.2,0.1,x\n";
+    let words = run_in(Path::new("."), &["solve", "-"], text.as_bytes()).stderr;
+    let (warning, error) = words.split_once('\n').unwrap_or_default();
+    // The warning comes before the matches are counted.
+    assert_eq!(warning, "warning: standard input: ignored unknown keys: tag");
+    assert_eq!(error, "error: standard input: matches: found 1 matches, expected at least 5\n");
+}
+
+#[test]
+fn solvers_in_every_format() {
+    let table = run(&["solvers"]);
+    assert_eq!((table.status, table.stderr.as_str()), (0, ""));
+    let list: serde_json::Value =
+        serde_json::from_str(&run(&["solvers", "--format", "json"]).stdout).unwrap();
+    let lines = run(&["solvers", "--format", "jsonl"]).stdout;
+    let csv = run(&["solvers", "--format", "csv"]).stdout;
+    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,reference"));
+    for (index, solver) in list.as_array().unwrap().iter().enumerate() {
+        let name = solver["name"].as_str().unwrap();
+        assert!(table.stdout.contains(name));
+        assert!(csv.lines().nth(index + 1).unwrap().starts_with(name));
+        assert_eq!(
+            &serde_json::from_str::<serde_json::Value>(lines.lines().nth(index).unwrap()).unwrap(),
+            solver
+        );
+    }
+}
+
+#[test]
+fn help_and_version() {
+    for arguments in [&["--help"][..], &["solve", "--help"], &["solvers", "--help"]] {
+        let run = run(arguments);
+        assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+        assert!(run.stdout.contains("Examples:\n"), "{}", run.stdout);
+    }
+    assert_eq!(run(&["--version"]).stdout, format!("quest-cli {}\n", env!("CARGO_PKG_VERSION")));
+}

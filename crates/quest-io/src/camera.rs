@@ -1,0 +1,26 @@
+//! Cameras as they are written in files and on the command line.
+
+use quest_core::{Camera, CameraError, CameraModel};
+
+/// The camera of COLMAP's model `name` with the parameters in COLMAP's order.
+///
+/// # Errors
+/// [`CameraError`] for an unknown model, and for parameters or a size that do not fit it.
+pub fn camera(name: &str, size: Option<(u32, u32)>, params: &[f64]) -> Result<Camera, CameraError> {
+    let camera = Camera::new(name.parse::<CameraModel>()?, params)?;
+    match size {
+        Some((width, height)) => camera.with_size(width, height),
+        None => Ok(camera),
+    }
+}
+
+/// The key of a camera that an error is about.
+pub(crate) fn key(error: &CameraError) -> Option<&'static str> {
+    match error {
+        CameraError::UnknownModel { .. } => Some("model"),
+        CameraError::ParameterCount { .. }
+        | CameraError::ParameterNotFinite { .. }
+        | CameraError::FocalLength { .. } => Some("params"),
+        _ => None,
+    }
+}

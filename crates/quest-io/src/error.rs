@@ -1,0 +1,140 @@
+//! What can be wrong with a file: where, what was found, what was expected.
+
+use std::{fmt, io};
+
+use quest_core::{CameraError, InputError, MatchError};
+
+/// A place in a file, `file:line:column: key`, as far as it is known.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file as it was named.
+    pub file: String,
+    /// Counted from one.
+    pub line: Option<usize>,
+    /// Counted from one, in bytes.
+    pub column: Option<usize>,
+    /// The path to the value, such as `matches[3]`, or the column of a CSV file.
+    pub key: Option<String>,
+}
+
+impl Place {
+    /// The file as a whole.
+    #[must_use]
+    pub fn file(name: impl Into<String>) -> Self {
+        Self { file: name.into(), ..Self::default() }
+    }
+
+    /// The same with a line.
+    #[must_use]
+    pub fn at_line(&self, line: usize) -> Self {
+        Self { line: Some(line), ..self.clone() }
+    }
+
+    /// The same with a key.
+    #[must_use]
+    pub fn at_key(&self, key: impl Into<String>) -> Self {
+        Self { key: Some(key.into()), ..self.clone() }
+    }
+
+    /// The error that `fault` is in this place.
+    #[must_use]
+    pub fn error(self, fault: impl Into<Fault>) -> ReadError {
+        ReadError { place: self, fault: Box::new(fault.into()) }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        if let Some(line) = self.line {
+            write!(f, ":{line}")?;
+        }
+        if let Some(column) = self.column {
+            write!(f, ":{column}")?;
+        }
+        self.key.as_ref().map_or(Ok(()), |key| write!(f, ": {key}"))
+    }
+}
+
+/// Why a file was refused.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}: {fault}")]
+pub struct ReadError {
+    /// Where.
+    pub place: Place,
+    /// What was found, and what was expected.
+    pub fault: Box<Fault>,
+}
+
+/// What is wrong with a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The system refuses to read it.
+    #[error("cannot be read: {}", plain(.0))]
+    Io(#[from] io::Error),
+    /// It is a directory.
+    #[error("found a directory, expected a file")]
+    Directory,
+    /// There is nothing in it.
+    #[error("found an empty file, expected matches as JSON, JSON Lines or CSV")]
+    Empty,
+    /// It is not text.
+    #[error("found the byte 0x{0:02x}, expected UTF-8 text")]
+    NotUtf8(u8),
+    /// It is not JSON, or not of the form expected.
+    #[error("{0}")]
+    Json(String),
+    /// It is not CSV.
+    #[error("{0}")]
+    Csv(String),
+    /// Two of the columns of a CSV file have the same name, or one is missing.
+    #[error("found the header {0:?}, expected u1,v1,u2,v2[,score]")]
+    Header(String),
+    /// A row of a CSV file is shorter or longer than its header.
+    #[error("found {found} values, expected {expected} as in the header")]
+    FieldCount {
+        /// Values in the row.
+        found: usize,
+        /// Columns in the header.
+        expected: usize,
+    },
+    /// A field of a CSV file is not a finite number.
+    #[error("found {0:?}, expected a finite number")]
+    NotANumber(String),
+    /// A camera is not understood.
+    #[error("{0}")]
+    Camera(#[from] CameraError),
+    /// The second camera is given, the first is not.
+    #[error("found a second camera without the first, expected camera1 as well")]
+    FirstCameraMissing,
+    /// The width of an image is given without its height, or the reverse.
+    #[error("found one of width and height, expected both or none")]
+    HalfASize,
+    /// There is not one score a match.
+    #[error("found {found} scores, expected {expected}, one a match")]
+    ScoreCount {
+        /// Scores in the file.
+        found: usize,
+        /// Matches in the file.
+        expected: usize,
+    },
+    /// A quaternion is not a rotation.
+    #[error("found a quaternion of length {0:?}, expected length 1 (w, x, y, z)")]
+    NotUnit(f64),
+    /// One match is unusable.
+    #[error("{0}")]
+    Match(#[from] MatchError),
+    /// The matches as a whole are unusable.
+    #[error("{0}")]
+    Matches(#[from] InputError),
+}
+
+/// The system's words without the number that Rust appends.
+pub(crate) fn plain(error: &io::Error) -> String {
+    let text = error.to_string();
+    match text.rfind(" (os error ") {
+        Some(end) => text[..end].to_owned(),
+        None => text,
+    }
+}

@@ -1,0 +1,137 @@
+//! Where results go: standard output, or a file that is written whole or not at all.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use tempfile::{Builder, NamedTempFile};
+
+use crate::error::plain;
+
+/// A result that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{target}: cannot be written: {}", plain(.source))]
+pub struct WriteError {
+    /// The file as it was named, or `standard output`.
+    pub target: String,
+    /// What the system says.
+    pub source: io::Error,
+}
+
+impl WriteError {
+    /// Whether the reader of a pipe has gone, as in `| head`: nobody is left to be told.
+    #[must_use]
+    pub fn is_broken_pipe(&self) -> bool {
+        self.source.kind() == io::ErrorKind::BrokenPipe
+    }
+}
+
+/// The target of a result. A file is kept in memory and appears, or is replaced, in [`Output::finish`].
+#[derive(Debug)]
+pub struct Output {
+    name: String,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    /// Written as it comes.
+    Stdout,
+    /// Devices, pipes and what else cannot be replaced.
+    Special(File),
+    /// Written beside the file under another name, then renamed.
+    File { path: PathBuf, text: Vec<u8> },
+}
+
+impl Output {
+    /// Standard output for `None`, `-` and `/dev/stdout`, else the file at `path`, which is not touched yet;
+    /// that its directory can be written to is tried.
+    ///
+    /// # Errors
+    /// A path that cannot be written to.
+    pub fn open(path: Option<&Path>) -> Result<Self, WriteError> {
+        match path.filter(|p| *p != Path::new("-") && *p != Path::new("/dev/stdout")) {
+            None => Ok(Self { name: "standard output".to_owned(), target: Target::Stdout }),
+            Some(path) => {
+                let name = path.display().to_string();
+                let target =
+                    Target::open(path).map_err(|source| WriteError { target: name.clone(), source })?;
+                Ok(Self { name, target })
+            }
+        }
+    }
+
+    /// Runs `write` on the target.
+    ///
+    /// # Errors
+    /// What the target says, with its name.
+    pub fn write(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+        let result = match &mut self.target {
+            Target::Stdout => write(&mut io::stdout().lock()),
+            Target::Special(file) => write(file),
+            Target::File { text, .. } => write(text),
+        };
+        result.map_err(|source| WriteError { target: self.name.clone(), source })
+    }
+
+    /// Brings everything to its place. Without this call a file stays as it was.
+    ///
+    /// # Errors
+    /// What the target says, with its name. A file is then as it was before.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let result = match self.target {
+            Target::Stdout => io::stdout().flush(),
+            Target::Special(mut file) => file.flush(),
+            Target::File { path, text } => replace(&path, &text),
+        };
+        result.map_err(|source| WriteError { target: self.name, source })
+    }
+}
+
+impl Target {
+    fn open(path: &Path) -> io::Result<Self> {
+        // `/dev/stderr` and `/dev/fd/3` may lead to regular files that others hold open: not to be replaced.
+        let existing = fs::metadata(path).ok();
+        let is_special = existing.as_ref().is_some_and(|m| !m.is_file() && !m.is_dir());
+        if is_special || path.starts_with("/dev") {
+            return Ok(Self::Special(OpenOptions::new().append(true).open(path)?));
+        }
+        if existing.as_ref().is_some_and(fs::Metadata::is_dir) {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        if existing.as_ref().is_some_and(|m| m.permissions().readonly()) {
+            return Err(io::ErrorKind::PermissionDenied.into());
+        }
+        // A link stays a link: the file it leads to is the one that is replaced.
+        let path = if existing.is_some() { fs::canonicalize(path)? } else { path.to_owned() };
+        tempfile::tempfile_in(directory(&path))?;
+        Ok(Self::File { path, text: Vec::new() })
+    }
+}
+
+fn directory(path: &Path) -> &Path {
+    path.parent().filter(|d| !d.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn replace(path: &Path, text: &[u8]) -> io::Result<()> {
+    let mut file = new_file(directory(path))?;
+    file.write_all(text)?;
+    if let Ok(existing) = fs::metadata(path) {
+        file.as_file().set_permissions(existing.permissions())?;
+    }
+    // A full disk may say so only here.
+    file.as_file().sync_all()?;
+    file.persist(path)?;
+    Ok(())
+}
+
+/// A file with the permissions that a new file has, not the private ones of temporary files.
+fn new_file(directory: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = Builder::new();
+    builder.prefix(".quest-");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory)
+}

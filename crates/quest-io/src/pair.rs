@@ -1,0 +1,87 @@
+//! An image pair: cameras, matches, and what else a file tells of them.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quest_core::{Camera, Correspondence, InputError, RelativePose, correspondence};
+
+use crate::error::{Place, ReadError};
+
+/// The matches of two images, with what is known of the cameras and of the true pose.
+#[derive(Clone, Debug, Default)]
+pub struct Pair {
+    /// What the file calls the pair.
+    pub name: Option<String>,
+    /// The cameras of view 1 and view 2; without them `matches` are on the planes `z = 1`.
+    pub cameras: Option<[Camera; 2]>,
+    /// `u1, v1, u2, v2` of each match, finite.
+    pub matches: Vec<[f64; 4]>,
+    /// One a match, higher is better.
+    pub scores: Option<Vec<f64>>,
+    /// The true pose.
+    pub truth: Truth,
+    /// Where the pair was read: the file, and the line of a JSON Lines file.
+    pub place: Place,
+    /// Keys or columns that are not known, in the order of the file. They were ignored.
+    pub unknown_keys: Vec<String>,
+}
+
+/// The ground truth of a pair, as far as the file has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Truth {
+    /// The true rotation.
+    pub q_21: Option<UnitQuaternion<f64>>,
+    /// The true translation; only its direction is compared.
+    pub t_21: Option<Vector3<f64>>,
+}
+
+impl Pair {
+    /// The matches as pairs of bearings, through the cameras where there are any.
+    ///
+    /// # Errors
+    /// The first match that has no bearings, with its place.
+    pub fn correspondences(&self) -> Result<Vec<Correspondence>, ReadError> {
+        let view = |k| self.matches.iter().map(|m| [m[k], m[k + 1]]).collect::<Vec<_>>();
+        let (x1, x2) = (view(0), view(2));
+        let matches = match &self.cameras {
+            Some([camera1, camera2]) => correspondence::from_pixels(camera1, &x1, camera2, &x2),
+            None => correspondence::from_image_points(&x1, &x2),
+        };
+        matches.map_err(|error| self.refuse(error))
+    }
+
+    /// The error that the matches of this pair are unusable, with their place.
+    #[must_use]
+    pub fn refuse(&self, error: InputError) -> ReadError {
+        match error {
+            InputError::Match { index, source } => {
+                self.place.at_key(format!("matches[{index}]")).error(source)
+            }
+            other => self.place.at_key("matches").error(other),
+        }
+    }
+
+    /// The mean focal length of the two cameras in pixels, `None` without cameras.
+    #[must_use]
+    pub fn focal_length(&self) -> Option<f64> {
+        let lengths = self.cameras?.map(|camera| camera.focal_lengths());
+        Some(lengths.iter().map(|(fx, fy)| fx + fy).sum::<f64>() / 4.0)
+    }
+}
+
+impl Truth {
+    /// The angle in degrees between the true rotation and that of `pose`.
+    #[must_use]
+    pub fn rotation_error_deg(&self, pose: &RelativePose) -> Option<f64> {
+        let truth = RelativePose::new(self.q_21?, Vector3::zeros());
+        Some(pose.rotation_error(&truth).to_degrees())
+    }
+
+    /// The angle in degrees between the true translation and that of `pose`; `None` where one of them vanishes.
+    #[must_use]
+    pub fn translation_error_deg(&self, pose: &RelativePose) -> Option<f64> {
+        let t_21 = self.t_21?;
+        // Lengths that cannot be squared are brought to 1 first.
+        let truth = RelativePose::new(UnitQuaternion::identity(), t_21.unscale(t_21.amax()));
+        let error = pose.translation_error(&truth)?.to_degrees();
+        error.is_finite().then_some(error)
+    }
+}

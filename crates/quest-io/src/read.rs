@@ -1,0 +1,192 @@
+//! From a path to pairs.
+
+use std::{
+    fs::File,
+    io::{self, BufRead, BufReader, Cursor, Read},
+    path::Path,
+};
+
+use crate::{
+    Pair, csv_file,
+    error::{Fault, Place, ReadError},
+    json_file,
+};
+
+/// What standard input is called in messages.
+pub const STANDARD_INPUT: &str = "standard input";
+
+/// The form of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// One JSON object: one pair.
+    Json,
+    /// One JSON object a line: one pair each.
+    JsonLines,
+    /// `u1,v1,u2,v2[,score]`, one match a row: one pair.
+    Csv,
+}
+
+impl Format {
+    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`.
+    #[must_use]
+    pub fn from_extension(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "json" => Some(Self::Json),
+            "jsonl" | "ndjson" => Some(Self::JsonLines),
+            "csv" => Some(Self::Csv),
+            _ => None,
+        }
+    }
+}
+
+/// The pairs of a file, one after the other; after an error there are no more.
+pub struct Pairs {
+    place: Place,
+    format: Format,
+    input: Box<dyn BufRead>,
+    /// Lines read so far.
+    line: usize,
+    found_any: bool,
+    done: bool,
+}
+
+/// Opens `path`, or standard input for `-`. Without a `format` the extension decides, and where there is none
+/// that is known, the beginning of the text.
+///
+/// # Errors
+/// A file that is missing, unreadable, a directory, or empty where its beginning is needed.
+pub fn read(path: &Path, format: Option<Format>) -> Result<Pairs, ReadError> {
+    let place = if path == Path::new("-") {
+        Place::file(STANDARD_INPUT)
+    } else {
+        Place::file(path.display().to_string())
+    };
+    let mut input = open(path).map_err(|fault| place.clone().error(fault))?;
+    let format = if let Some(format) = format.or_else(|| Format::from_extension(path)) {
+        format
+    } else {
+        let (format, start) = sniff(&mut input).map_err(|e| place.clone().error(e))?;
+        input = Box::new(Cursor::new(start).chain(input));
+        format
+    };
+    Ok(Pairs { place, format, input, line: 0, found_any: false, done: false })
+}
+
+fn open(path: &Path) -> Result<Box<dyn BufRead>, Fault> {
+    if path == Path::new("-") {
+        return Ok(Box::new(io::stdin().lock()));
+    }
+    if path.is_dir() {
+        return Err(Fault::Directory);
+    }
+    Ok(Box::new(BufReader::new(File::open(path)?)))
+}
+
+/// The form that the beginning of the text has, and the beginning, which was taken from `input`.
+fn sniff(input: &mut dyn BufRead) -> io::Result<(Format, Vec<u8>)> {
+    let mut text = Vec::new();
+    let first = next_line(input, &mut text)?;
+    let is_json = matches!(first.first(), Some(b'{' | b'['));
+    let is_whole = serde_json::from_slice::<serde::de::IgnoredAny>(&first).is_ok();
+    let format = match (is_json, is_whole) {
+        (false, _) => Format::Csv,
+        (true, true) if !next_line(input, &mut text)?.is_empty() => Format::JsonLines,
+        (true, _) => Format::Json,
+    };
+    Ok((format, text))
+}
+
+/// The next line that is not blank, trimmed; all that was read is appended to `text`.
+fn next_line(input: &mut dyn BufRead, text: &mut Vec<u8>) -> io::Result<Vec<u8>> {
+    loop {
+        let mut line = Vec::new();
+        let end = input.read_until(b'\n', &mut line)? == 0;
+        text.extend_from_slice(&line);
+        let line = without_mark(&line).trim_ascii();
+        if end || !line.is_empty() {
+            return Ok(line.to_vec());
+        }
+    }
+}
+
+/// The text without the byte order mark that some editors begin a file with.
+fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+impl Pairs {
+    /// The form of the file.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    fn whole(&mut self) -> Result<Pair, ReadError> {
+        let mut bytes = Vec::new();
+        self.input.read_to_end(&mut bytes).map_err(|e| self.place.clone().error(e))?;
+        let text = utf8(&self.place, &bytes)?;
+        if text.trim().is_empty() {
+            return Err(self.place.clone().error(Fault::Empty));
+        }
+        match self.format {
+            Format::Csv => csv_file::parse(&self.place, text),
+            Format::Json | Format::JsonLines => json_file::parse(&self.place, text),
+        }
+    }
+
+    /// The pair on the next line that is not blank.
+    fn one_line(&mut self) -> Option<Result<Pair, ReadError>> {
+        loop {
+            let mut bytes = Vec::new();
+            match self.input.read_until(b'\n', &mut bytes) {
+                Err(error) => return Some(Err(self.place.clone().error(error))),
+                Ok(0) if !self.found_any => return Some(Err(self.place.clone().error(Fault::Empty))),
+                Ok(0) => return None,
+                Ok(_) => self.line += 1,
+            }
+            let place = self.place.at_line(self.line);
+            match utf8(&place, &bytes) {
+                Err(error) => return Some(Err(error)),
+                Ok(text) if text.trim().is_empty() => {}
+                Ok(text) => return Some(json_file::parse(&place, text.trim_end())),
+            }
+        }
+    }
+}
+
+fn utf8<'a>(place: &Place, bytes: &'a [u8]) -> Result<&'a str, ReadError> {
+    let bytes = without_mark(bytes);
+    std::str::from_utf8(bytes).map_err(|e| {
+        let (before, rest) = bytes.split_at(e.valid_up_to());
+        let line = place.line.unwrap_or_else(|| before.split(|&b| b == b'\n').count());
+        place.at_line(line).error(Fault::NotUtf8(rest.first().copied().unwrap_or_default()))
+    })
+}
+
+impl Iterator for Pairs {
+    type Item = Result<Pair, ReadError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.done {
+            return None;
+        }
+        let pair = match self.format {
+            Format::JsonLines => self.one_line(),
+            Format::Json | Format::Csv => Some(self.whole()),
+        };
+        self.found_any = true;
+        self.done = self.format != Format::JsonLines || !matches!(pair, Some(Ok(_)));
+        pair
+    }
+}
+
+impl std::fmt::Debug for Pairs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { place, format, line, .. } = self;
+        f.debug_struct("Pairs")
+            .field("place", place)
+            .field("format", format)
+            .field("line", line)
+            .finish_non_exhaustive()
+    }
+}
