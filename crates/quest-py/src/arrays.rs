@@ -7,7 +7,7 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::errors::ShapeMismatch;
+use crate::errors::{NotFinite, ShapeMismatch};
 
 /// Points as they came: two numbers a row, or three.
 pub(crate) enum Points {
@@ -70,7 +70,12 @@ struct Real<'a, 'py> {
 impl<'a, 'py> Real<'a, 'py> {
     fn new(name: &'a str, given: &Bound<'py, PyAny>, expected: &'a str) -> PyResult<Self> {
         let py = given.py();
-        let array = py.import("numpy")?.call_method1("asarray", (given,)).map_err(|error| {
+        let numpy = py.import("numpy")?;
+        // The array would come without its mask.
+        if numpy.getattr("ma")?.call_method1("is_masked", (given,))?.is_truthy()? {
+            return Err(NotFinite::new_err(format!("{name} has masked values, expected {expected}")));
+        }
+        let array = numpy.call_method1("asarray", (given,)).map_err(|error| {
             // Ragged lists are the one thing that NumPy calls a ValueError here.
             if !error.is_instance_of::<PyValueError>(py) {
                 return error;

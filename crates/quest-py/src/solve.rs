@@ -39,7 +39,7 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 /// TooFewMatches
 ///     For fewer matches than the solver needs.
 /// NotFinite
-///     For a coordinate that is NaN or infinite.
+///     For a coordinate that is NaN, infinite or masked.
 /// ShapeMismatch
 ///     For an array of another shape, or views with different numbers of points.
 /// DegenerateInput

@@ -32,6 +32,7 @@ CASES: list[tuple[Callable[[], object], type[Exception], list[str]]] = [
     (lambda: qp.solve(with_value(np.nan), X2), qp.NotFinite, ["match 3", "view 1", "NaN", "finite"]),
     (lambda: qp.solve(X2, with_value(-np.inf)), qp.NotFinite, ["match 3", "view 2", "-inf"]),
     (lambda: qp.solve(with_value(np.nan), X2, K), qp.NotFinite, ["match 3", "view 1", "NaN"]),
+    (lambda: qp.solve(np.ma.masked_less(X1, 0), X2), qp.NotFinite, ["x1", "masked", POINTS]),
     (lambda: qp.solve(X1, X2[:4]), qp.ShapeMismatch, ["view 1", "5", "view 2", "4"]),
     (lambda: qp.solve(X1.T, X2.T), qp.ShapeMismatch, ["x1", "(2, 5)", POINTS]),
     (lambda: qp.solve(X1, X2[:, :1]), qp.ShapeMismatch, ["x2", "(5, 1)", POINTS]),
