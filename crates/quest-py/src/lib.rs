@@ -1,1 +1,30 @@
-//! Placeholder of the skeleton.
+//! The extension module `quest_pose._core`: checks shapes, converts, releases the interpreter's lock, calls the
+//! core and maps its errors.
+
+mod arrays;
+mod camera;
+mod candidate;
+mod errors;
+mod solve;
+
+use pyo3::pymodule;
+
+/// What `quest_pose` re-exports.
+#[pymodule]
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::candidate::{_candidate, Candidate};
+    #[pymodule_export]
+    use crate::errors::{BadCamera, DegenerateInput, NotFinite, QuestError, ShapeMismatch, TooFewMatches};
+    #[pymodule_export]
+    use crate::solve::{_solvers, constraint_matrix, solve};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,116 @@
+//! From whatever NumPy can view as an array of numbers to rows of `f64`, and back.
+
+use numpy::{
+    IntoPyArray, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArray, PyUntypedArrayMethods, ndarray::Array2,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::errors::{NotFinite, ShapeMismatch};
+
+/// Points as they came: two numbers a row, or three.
+pub(crate) enum Points {
+    /// Pixels, or points on the plane `z = 1`.
+    Image(Vec<[f64; 2]>),
+    /// Bearings of any length.
+    Bearings(Vec<[f64; 3]>),
+}
+
+impl Points {
+    pub(crate) fn columns(&self) -> usize {
+        match self {
+            Self::Image(_) => 2,
+            Self::Bearings(_) => 3,
+        }
+    }
+}
+
+/// Points of the argument `name`, of shape `(N, 2)` or `(N, 3)`.
+pub(crate) fn points(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Points> {
+    let array = Real::new(name, given, "real numbers of shape (N, 2) or (N, 3)")?;
+    match *array.array.shape() {
+        [_, 3] => array.rows().map(Points::Bearings),
+        _ => array.rows().map(Points::Image),
+    }
+}
+
+/// Rows of `D` numbers from the argument `name`.
+pub(crate) fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]>> {
+    Real::new(name, given, &format!("real numbers of shape (N, {D})"))?.rows()
+}
+
+/// The 3 x 3 matrix of the argument `name`.
+pub(crate) fn matrix3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<[[f64; 3]; 3]> {
+    let array = Real::new(name, given, "a Camera or a matrix K of shape (3, 3)")?;
+    array.rows()?.try_into().map_err(|_| array.mismatch())
+}
+
+/// The numbers of the argument `name`, of shape `(N,)`.
+pub(crate) fn vector(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = Real::new(name, given, "real numbers of shape (N,)")?;
+    match *array.array.shape() {
+        [_] => Ok(array.numbers()?.as_slice()?.to_vec()),
+        _ => Err(array.mismatch()),
+    }
+}
+
+/// A new array of shape `(N, D)`.
+pub(crate) fn to_numpy<const D: usize>(py: Python<'_>, rows: Vec<[f64; D]>) -> Bound<'_, PyArray2<f64>> {
+    Array2::from(rows).into_pyarray(py)
+}
+
+/// An array of real numbers whose shape is still to be checked.
+struct Real<'a, 'py> {
+    name: &'a str,
+    expected: &'a str,
+    array: Bound<'py, PyUntypedArray>,
+}
+
+impl<'a, 'py> Real<'a, 'py> {
+    fn new(name: &'a str, given: &Bound<'py, PyAny>, expected: &'a str) -> PyResult<Self> {
+        let py = given.py();
+        let numpy = py.import("numpy")?;
+        // The array would come without its mask.
+        if numpy.getattr("ma")?.call_method1("is_masked", (given,))?.is_truthy()? {
+            return Err(NotFinite::new_err(format!("{name} has masked values, expected {expected}")));
+        }
+        let array = numpy.call_method1("asarray", (given,)).map_err(|error| {
+            // Ragged lists are the one thing that NumPy calls a ValueError here.
+            if !error.is_instance_of::<PyValueError>(py) {
+                return error;
+            }
+            ShapeMismatch::new_err(format!("{name}: {}, expected {expected}", error.value(py)))
+        })?;
+        let array = array.cast_into::<PyUntypedArray>()?;
+        // Complex numbers would lose their imaginary part, and NumPy would parse strings.
+        if !b"biuf".contains(&array.dtype().kind()) {
+            let dtype = array.dtype();
+            return Err(PyTypeError::new_err(format!("{name} has the dtype {dtype}, expected {expected}")));
+        }
+        Ok(Self { name, expected, array })
+    }
+
+    fn rows<const D: usize>(&self) -> PyResult<Vec<[f64; D]>> {
+        match *self.array.shape() {
+            [_, columns] if columns == D => Ok(self.numbers()?.as_slice()?.as_chunks().0.to_vec()),
+            _ => Err(self.mismatch()),
+        }
+    }
+
+    /// All numbers, row after row.
+    fn numbers(&self) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+        let numpy = self.array.py().import("numpy")?;
+        // C: in C order. A: aligned. NumPy copies only where one of them, or the dtype, differs.
+        let array = numpy.call_method1("require", (&self.array, "f8", ["C", "A"]))?;
+        Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
+    }
+
+    fn mismatch(&self) -> PyErr {
+        let Self { name, expected, array } = self;
+        array.getattr("shape").map_or_else(
+            |error| error,
+            |shape| ShapeMismatch::new_err(format!("{name} has the shape {shape}, expected {expected}")),
+        )
+    }
+}

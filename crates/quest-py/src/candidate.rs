@@ -1,0 +1,167 @@
+//! `Candidate`: one pose that may be the true one.
+
+use nalgebra::{Quaternion, UnitQuaternion};
+use numpy::{PyArray1, PyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use quest_core::{Correspondence, RelativePose};
+
+use crate::arrays;
+
+/// A pose that may be the true one, as ``solve`` returns it: ``X2 = R @ X1 + t``.
+///
+/// ``X1`` and ``X2`` are the coordinates of a point in the frames of camera 1 and camera 2: x to the right,
+/// y down, z forward. ``t`` and the depths share one scale: the mean absolute depth over both views is 1, so that
+/// the length of ``t`` is the parallax. A candidate never changes: its arrays are fresh copies at each access.
+#[pyclass(frozen, eq, module = "quest_pose")]
+#[derive(Debug, PartialEq)]
+pub(crate) struct Candidate {
+    /// str : Where it comes from.
+    ///
+    /// ``"exact"`` is a real solution of the constraints, ``"from_complex"`` the real part of a complex one,
+    /// ``"rotation_only"`` the rotation that best aligns the bearings.
+    #[pyo3(get)]
+    kind: String,
+    pose: RelativePose,
+    depths1: Vec<f64>,
+    depths2: Vec<f64>,
+    /// float : How far the matches are from satisfying the epipolar constraint, in radians.
+    ///
+    /// The root mean square over the matches of the angle by which the bearings would have to turn.
+    #[pyo3(get)]
+    residual: f64,
+    /// int : How many of the matches have positive depth in both views.
+    #[pyo3(get)]
+    in_front: usize,
+}
+
+impl Candidate {
+    /// A candidate of the core for these matches.
+    pub(crate) fn new(candidate: &quest_core::Candidate, matches: &[Correspondence]) -> Self {
+        let quest_core::Candidate { kind, pose, residual, in_front } = *candidate;
+        let (depths1, depths2) = matches.iter().map(|m| depths(&pose, m)).unzip();
+        Self { kind: kind.name().to_owned(), pose: canonical(pose), depths1, depths2, residual, in_front }
+    }
+}
+
+/// The depths of a match, infinite where undetermined: NaN would make two equal candidates differ.
+fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
+    // Without a translation the least-squares depths are zero, whatever the true ones.
+    let depths = if pose.t_21.amax() > 0.0 { pose.depths(m) } else { None };
+    let finite = |z: f64| if z.is_finite() { z } else { f64::INFINITY };
+    depths.map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
+}
+
+/// The same pose with the sign of the quaternion that is shown, so that a pickled copy is equal.
+fn canonical(pose: RelativePose) -> RelativePose {
+    let [w, i, j, k] = pose.wxyz();
+    RelativePose { q_21: UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)), ..pose }
+}
+
+type State = (String, [f64; 4], [f64; 3], Vec<f64>, Vec<f64>, f64, usize);
+
+/// The candidate that ``Candidate.__reduce__`` took apart.
+#[pyfunction]
+pub(crate) fn _candidate(state: State) -> Candidate {
+    let (kind, [w, i, j, k], t_21, depths1, depths2, residual, in_front) = state;
+    let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+    let pose = RelativePose::new(q_21, t_21.into());
+    Candidate { kind, pose, depths1, depths2, residual, in_front }
+}
+
+#[pymethods]
+impl Candidate {
+    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
+    #[getter]
+    #[pyo3(name = "R")]
+    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::to_numpy(py, self.r_21().to_vec())
+    }
+
+    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.t_21.as_slice().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
+    #[getter]
+    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.wxyz().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
+    #[getter]
+    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let [w, x, y, z] = self.pose.wxyz();
+        [x, y, z, w].to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (N,) : The depth of each match in view 1, in the unit of ``t``.
+    ///
+    /// A depth multiplies the point as it was given: it is a z coordinate for normalised points and for pixels of
+    /// perspective cameras, a distance for unit bearings and for pixels of fisheye cameras. It is ``numpy.inf``
+    /// where none is determined: where the two rays are parallel, or ``t`` is zero. It is never NaN.
+    #[getter]
+    fn depths1<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.depths1.to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (N,) : The depth of each match in view 2; see ``depths1``.
+    #[getter]
+    fn depths2<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.depths2.to_pyarray(py)
+    }
+
+    /// bool : Whether every match lies in front of both cameras.
+    #[getter]
+    fn feasible(&self) -> bool {
+        self.in_front == self.depths1.len()
+    }
+
+    /// The candidate as plain numbers and lists, ready for ``json.dumps``.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     ``kind``, ``q_21`` (w, x, y, z), ``R_21``, ``t_21``, ``depths1``, ``depths2``, ``residual``,
+    ///     ``in_front`` and ``feasible``, as the command line writes them. An undetermined depth is None.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let finite =
+            |depths: &[f64]| -> Vec<_> { depths.iter().map(|&d| d.is_finite().then_some(d)).collect() };
+        let dict = PyDict::new(py);
+        dict.set_item("kind", &self.kind)?;
+        dict.set_item("q_21", self.pose.wxyz().to_vec())?;
+        dict.set_item("R_21", self.r_21().map(Vec::from).to_vec())?;
+        dict.set_item("t_21", self.pose.t_21.as_slice())?;
+        dict.set_item("depths1", finite(&self.depths1))?;
+        dict.set_item("depths2", finite(&self.depths2))?;
+        dict.set_item("residual", self.residual)?;
+        dict.set_item("in_front", self.in_front)?;
+        dict.set_item("feasible", self.feasible())?;
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        let Self { kind, pose, residual, in_front, depths1, .. } = self;
+        let (q, t) = (pose.wxyz(), pose.t_21.as_slice());
+        format!(
+            "<Candidate {kind}: quat_wxyz={q:.6?}, t={t:.6?}, residual={residual:.1e}, in_front={in_front} of {}>",
+            depths1.len()
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
+        let Self { kind, pose, depths1, depths2, residual, in_front } = self;
+        let (q, t) = (pose.wxyz(), pose.t_21.into());
+        let state = (kind.clone(), q, t, depths1.clone(), depths2.clone(), *residual, *in_front);
+        Ok((py.import("quest_pose._core")?.getattr("_candidate")?, (state,)))
+    }
+}
+
+impl Candidate {
+    fn r_21(&self) -> [[f64; 3]; 3] {
+        // nalgebra keeps columns, NumPy rows.
+        self.pose.r_21().transpose().into()
+    }
+}

@@ -1,0 +1,75 @@
+//! The errors Python sees: one class a cause, all of them a `ValueError`.
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use quest_core::{CameraError, Degeneracy, InputError, MatchError};
+
+create_exception!(
+    quest_pose,
+    QuestError,
+    PyValueError,
+    "Why no answer can be given. The base of the other errors."
+);
+create_exception!(quest_pose, TooFewMatches, QuestError, "There are fewer matches than the solver needs.");
+create_exception!(quest_pose, NotFinite, QuestError, "A number is NaN or infinite.");
+create_exception!(
+    quest_pose,
+    ShapeMismatch,
+    QuestError,
+    "An array does not have the shape that is expected."
+);
+create_exception!(
+    quest_pose,
+    DegenerateInput,
+    QuestError,
+    "The points determine no pose, or have no direction."
+);
+create_exception!(
+    quest_pose,
+    BadCamera,
+    QuestError,
+    "A camera is impossible, or has no viewing ray for a pixel."
+);
+
+/// The exception for a set of matches that the core refuses.
+pub(crate) fn input(error: &InputError) -> PyErr {
+    let message = error.to_string();
+    match error {
+        InputError::Match { source, .. } => match source {
+            MatchError::NotFinite { .. } => NotFinite::new_err(message),
+            MatchError::TooFar { .. } | MatchError::NoDirection { .. } => DegenerateInput::new_err(message),
+            MatchError::Camera { source, .. } => of_camera(source, message),
+            _ => QuestError::new_err(message),
+        },
+        InputError::LengthMismatch { .. } => ShapeMismatch::new_err(message),
+        InputError::TooFewMatches { .. } => TooFewMatches::new_err(message),
+        _ => QuestError::new_err(message),
+    }
+}
+
+/// The exception for a camera that the core refuses, called `name` by the caller.
+pub(crate) fn camera(name: &str, error: &CameraError) -> PyErr {
+    of_camera(error, format!("{name}: {error}"))
+}
+
+fn of_camera(error: &CameraError, message: String) -> PyErr {
+    match error {
+        CameraError::NotFinite { .. } => NotFinite::new_err(message),
+        _ => BadCamera::new_err(message),
+    }
+}
+
+/// The exception where a degeneracy left no candidate.
+pub(crate) fn degenerate(degeneracy: Degeneracy) -> PyErr {
+    let reason = match degeneracy {
+        Degeneracy::TooFewMatches => "there are fewer matches than the solver needs",
+        Degeneracy::Coincident => "all points coincide in one view",
+        Degeneracy::Duplicate => "matches are repeated, and too few distinct ones are left",
+        Degeneracy::Collinear => "too many of the points lie on a line",
+        Degeneracy::RankDeficient => "they give fewer than five independent constraints",
+        Degeneracy::PureRotation => "a rotation alone explains them; kinds=\"all\" returns it",
+        _ => degeneracy.name(),
+    };
+    DegenerateInput::new_err(format!("the matches do not determine a pose: {reason}"))
+}

@@ -1,0 +1,196 @@
+//! `solve`, `constraint_matrix` and the table of solvers.
+
+use numpy::PyArray2;
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+use quest_core::solver::{Kinds, SolverName};
+use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence, quaternion};
+
+use crate::arrays::{self, Points};
+use crate::camera;
+use crate::candidate::Candidate;
+use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
+
+/// Candidate poses from five or more correct matches.
+///
+/// Parameters
+/// ----------
+/// x1, x2 : array_like of shape (N, 2) or (N, 3)
+///     The same N points in view 1 and in view 2: pixels where cameras are given, otherwise points on the plane
+///     z = 1 of each camera (normalised image coordinates). Three numbers a row are bearings of any length, and
+///     take no camera.
+/// camera1, camera2 : Camera or array_like of shape (3, 3), optional
+///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
+/// solver : str, optional
+///     One of the names in ``solvers()``; the first of them where absent.
+/// kinds : {"all", "exact"}
+///     Whether to return every candidate, or the real solutions of the constraints alone.
+///
+/// Returns
+/// -------
+/// list of Candidate
+///     Best first: most points in front of both cameras, then the smallest residual. Candidates with points
+///     behind a camera are among them; their ``feasible`` is False. Empty where the constraints have no real
+///     solution and those alone were asked for. Matches that a rotation alone explains give that rotation,
+///     with ``t = 0``.
+///
+/// Raises
+/// ------
+/// TooFewMatches
+///     For fewer matches than the solver needs.
+/// NotFinite
+///     For a coordinate that is NaN, infinite or masked.
+/// ShapeMismatch
+///     For an array of another shape, or views with different numbers of points.
+/// DegenerateInput
+///     For points that determine no pose (coincident, collinear, repeated), and for one that has no direction.
+/// BadCamera
+///     For an impossible camera, or a pixel for which it has no viewing ray.
+/// QuestError
+///     The base of these, itself for an unknown ``solver`` or ``kinds``.
+///
+/// Notes
+/// -----
+/// The lock of the interpreter is released while the solver works.
+#[pyfunction]
+#[pyo3(signature = (x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all"))]
+pub(crate) fn solve(
+    py: Python<'_>,
+    x1: &Bound<'_, PyAny>,
+    x2: &Bound<'_, PyAny>,
+    camera1: Option<&Bound<'_, PyAny>>,
+    camera2: Option<&Bound<'_, PyAny>>,
+    solver: Option<&str>,
+    kinds: &str,
+) -> PyResult<Vec<Candidate>> {
+    let solver = solver_named(solver)?;
+    let kinds = kinds_named(kinds)?;
+    let views = Views::new(x1, x2, camera1, camera2)?;
+    let solved = py.detach(|| {
+        let matches = views.matches()?;
+        let (found, needed) = (matches.len(), solver.info().min_matches);
+        if found < needed {
+            return Err(InputError::TooFewMatches { found, needed });
+        }
+        let mut out = Candidates::new();
+        solver.solve(kinds, &matches, &mut out);
+        let candidates: Vec<_> = out.iter().map(|c| Candidate::new(c, &matches)).collect();
+        Ok((candidates, out.degeneracy()))
+    });
+    match solved.map_err(|error| errors::input(&error))? {
+        (candidates, Some(degeneracy)) if candidates.is_empty() => Err(errors::degenerate(degeneracy)),
+        (candidates, _) => Ok(candidates),
+    }
+}
+
+/// The coefficients of the quartic constraints on the rotation, one row for three matches.
+///
+/// Parameters
+/// ----------
+/// x1, x2 : array_like of shape (N, 2) or (N, 3)
+///     The same N points in view 1 and in view 2, on the plane z = 1 of each camera or as bearings.
+///
+/// Returns
+/// -------
+/// numpy.ndarray of shape (N (N - 1) (N - 2) / 6, 35)
+///     Each row is the polynomial ``det[n_i n_j n_k] / |q|**2`` of three matches i < j < k, in lexicographic
+///     order, with ``n = x2 x R(q) x1``. It vanishes at the true rotation. The columns are the monomials of
+///     degree four in ``(q1, q2, q3, q4)``, scalar first: ``q1**4, q1**3 q2, q1**3 q3, ..., q4**4``.
+///
+/// Raises
+/// ------
+/// TooFewMatches
+///     For fewer than three matches.
+/// NotFinite, ShapeMismatch, DegenerateInput
+///     As ``solve``.
+/// MemoryError
+///     For more rows than there is memory.
+#[pyfunction]
+pub(crate) fn constraint_matrix<'py>(
+    py: Python<'py>,
+    x1: &Bound<'py, PyAny>,
+    x2: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let views = Views::new(x1, x2, None, None)?;
+    let rows = py.detach(|| {
+        let matches = views.matches().map_err(|error| errors::input(&error))?;
+        reserve_rows(matches.len())?;
+        quaternion::constraint_matrix(&matches).map_err(|error| errors::input(&error))
+    })?;
+    Ok(arrays::to_numpy(py, rows))
+}
+
+/// Whether the rows of N matches fit in memory at all: the core would abort where they do not.
+fn reserve_rows(matches: usize) -> PyResult<()> {
+    let n = matches as u128;
+    let rows = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
+    let fits =
+        usize::try_from(rows).is_ok_and(|rows| Vec::<[f64; 35]>::new().try_reserve_exact(rows).is_ok());
+    let message = || format!("{matches} matches make {rows} rows, which do not fit in memory");
+    if fits { Ok(()) } else { Err(PyMemoryError::new_err(message())) }
+}
+
+/// The rows of ``solvers()``.
+#[pyfunction]
+pub(crate) fn _solvers() -> Vec<(&'static str, usize, usize, &'static str)> {
+    let infos = SolverName::ALL.map(SolverName::info);
+    infos.iter().map(|i| (i.name, i.min_matches, i.max_candidates, i.reference)).collect()
+}
+
+fn solver_named(name: Option<&str>) -> PyResult<SolverName> {
+    name.map_or(Ok(SolverName::default()), str::parse).map_err(|error| QuestError::new_err(error.to_string()))
+}
+
+fn kinds_named(name: &str) -> PyResult<Kinds> {
+    match name {
+        "all" => Ok(Kinds::All),
+        "exact" => Ok(Kinds::Exact),
+        _ => Err(QuestError::new_err(format!("kinds is {name:?}, expected \"all\" or \"exact\""))),
+    }
+}
+
+/// Two views of the same points, of the right shapes.
+enum Views {
+    Image(Vec<[f64; 2]>, Vec<[f64; 2]>),
+    Pixels(Box<[Camera; 2]>, Vec<[f64; 2]>, Vec<[f64; 2]>),
+    Bearings(Vec<[f64; 3]>, Vec<[f64; 3]>),
+}
+
+impl Views {
+    fn new(
+        x1: &Bound<'_, PyAny>,
+        x2: &Bound<'_, PyAny>,
+        camera1: Option<&Bound<'_, PyAny>>,
+        camera2: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let camera1 = camera1.map(|c| camera::from_argument("camera1", c)).transpose()?;
+        let camera2 = camera2.map(|c| camera::from_argument("camera2", c)).transpose()?;
+        match (arrays::points("x1", x1)?, arrays::points("x2", x2)?) {
+            (Points::Image(x1), Points::Image(x2)) => match (camera1, camera2) {
+                (None, None) => Ok(Self::Image(x1, x2)),
+                (Some(camera1), None) => Ok(Self::Pixels([camera1, camera1].into(), x1, x2)),
+                (Some(camera1), Some(camera2)) => Ok(Self::Pixels([camera1, camera2].into(), x1, x2)),
+                (None, Some(_)) => Err(BadCamera::new_err("camera2 is given without camera1, expected both")),
+            },
+            (Points::Bearings(x1), Points::Bearings(x2)) => match (camera1, camera2) {
+                (None, None) => Ok(Self::Bearings(x1, x2)),
+                _ => Err(ShapeMismatch::new_err(
+                    "x1 and x2 have the shape (N, 3), expected pixels of shape (N, 2) where cameras are given",
+                )),
+            },
+            (x1, x2) => Err(ShapeMismatch::new_err(format!(
+                "x1 has {} columns and x2 has {}, expected as many",
+                x1.columns(),
+                x2.columns()
+            ))),
+        }
+    }
+
+    fn matches(&self) -> Result<Vec<Correspondence>, InputError> {
+        match self {
+            Self::Image(x1, x2) => correspondence::from_image_points(x1, x2),
+            Self::Pixels(cameras, u1, u2) => correspondence::from_pixels(&cameras[0], u1, &cameras[1], u2),
+            Self::Bearings(x1, x2) => correspondence::from_bearings(x1, x2),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+"""What the package says of itself."""
+
+import doctest
+import inspect
+import re
+from importlib.metadata import requires, version
+from pathlib import Path
+
+import pytest
+import quest_pose as qp
+
+
+def test_version() -> None:
+    assert qp.__version__ == version("quest-pose")
+
+
+def test_numpy_is_all_it_needs() -> None:
+    assert [r.split(">")[0] for r in requires("quest-pose") or []] == ["numpy"]
+
+
+def test_examples() -> None:
+    result = doctest.testmod(qp)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_readme(capsys: pytest.CaptureFixture[str]) -> None:
+    readme = Path(__file__).parents[1] / "README.md"
+    (example,) = re.findall("```python\n(.*?)```", readme.read_text(), re.DOTALL)
+    exec(example, {})
+    # The pixels were made with a rotation by (0.02, -0.1, 0.03) rad.
+    assert capsys.readouterr().out.startswith("exact True [ 0.9985")
+
+
+@pytest.mark.parametrize("name", [n for n in qp.__all__ if n != "__version__"])
+def test_everything_is_documented(name: str) -> None:
+    public = getattr(qp, name)
+    assert inspect.getdoc(public)
+    if inspect.isclass(public) and public.__module__ == "quest_pose" and not issubclass(public, Exception):
+        for member in (n for n in vars(public) if not n.startswith("_")):
+            assert inspect.getdoc(getattr(public, member)), member
+
+
+def test_signature() -> None:
+    signature = '(x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all")'
+    assert str(inspect.signature(qp.solve)).replace("'", '"') == signature
