@@ -25,6 +25,7 @@ pub mod camera;
 pub mod candidate;
 pub mod correspondence;
 pub mod pose;
+pub mod simulate;
 pub mod solver;
 
 pub use camera::{Camera, CameraError, CameraModel};
