@@ -1,6 +1,6 @@
 //! Matched points as pairs of bearings, checked once at the door.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{Camera, CameraError};
 
@@ -131,6 +131,12 @@ impl Correspondence {
             camera.bearing(u).map_err(|source| MatchError::Camera { view, source })
         };
         Self::from_bearings(ray(1, camera1, u1)?.into(), ray(2, camera2, u2)?.into())
+    }
+
+    /// The match as a camera 2 would see it that is turned, its bearings multiplied by `g`.
+    pub(crate) fn with_view2_rotated(mut self, g: &UnitQuaternion<f64>) -> Self {
+        self.bearing2 = g * self.bearing2;
+        self
     }
 
     /// The unit bearing in the frame of camera 1.

@@ -21,12 +21,18 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod algebra;
+pub mod alignment;
 pub mod camera;
 pub mod candidate;
 pub mod correspondence;
+mod degeneracy;
+pub mod feasibility;
 pub mod pose;
+pub mod quaternion;
 pub mod simulate;
 pub mod solver;
+pub mod structure;
 
 pub use camera::{Camera, CameraError, CameraModel};
 pub use candidate::{Candidate, CandidateKind, Candidates, Degeneracy};

@@ -4,6 +4,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::Correspondence;
 
+/// Two rays closer than this (the sine of their angle) are parallel to rounding: their depths are noise.
+pub(crate) const PARALLEL: f64 = 8.0 * f64::EPSILON;
+
 /// Camera 2 relative to camera 1: `X2 = R_21 X1 + t_21` (section 5 of the paper, figure 2).
 ///
 /// `t_21` shares its scale with the depths; see [`crate::Candidate::depths`].
@@ -83,12 +86,35 @@ impl RelativePose {
         let c = self.q_21 * m.bearing1();
         let n = m.bearing2().cross(&c);
         let nn = n.norm_squared();
-        // Below the rounding of the cross product itself the direction of n is noise.
-        if nn <= f64::EPSILON * f64::EPSILON {
+        if nn <= PARALLEL * PARALLEL {
             return None;
         }
+        // Equation (28) crossed with b, and with c.
         let range1 = -m.bearing2().cross(&self.t_21).dot(&n) / nn;
         let range2 = -c.cross(&self.t_21).dot(&n) / nn;
         Some((range1 / m.length1(), range2 / m.length2()))
+    }
+
+    /// The Sampson error of a match on the sphere, in radians: to first order, the root of the summed squares of
+    /// the angles by which its two bearings have to turn to satisfy `x2ᵀ E x1 = 0`.
+    ///
+    /// Where the translation is zero the bearings have to meet instead.
+    #[must_use]
+    pub fn sampson_error(&self, m: &Correspondence) -> f64 {
+        let (b, c) = (m.bearing2(), self.q_21 * m.bearing1());
+        let Some(t) = self.t_21.try_normalize(0.0) else {
+            return b.cross(&c).norm().atan2(b.dot(&c)) * std::f64::consts::FRAC_1_SQRT_2;
+        };
+        let e = t.dot(&b.cross(&c));
+        // The gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e.
+        let gradient2 = t.cross(&c).norm_squared() + t.cross(b).norm_squared() - 2.0 * e * e;
+        e.abs().atan2(gradient2.max(0.0).sqrt())
+    }
+
+    /// Root mean square of [`sampson_error`](Self::sampson_error) over the matches, in radians.
+    #[must_use]
+    pub fn residual(&self, matches: &[Correspondence]) -> f64 {
+        let sum: f64 = matches.iter().map(|m| self.sampson_error(m).powi(2)).sum();
+        (sum / matches.len().max(1) as f64).sqrt()
     }
 }

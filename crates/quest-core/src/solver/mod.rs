@@ -1,6 +1,9 @@
 //! The pose solvers, one file each, behind one small trait.
 
+mod constraints;
+mod motion;
 mod quest_eigen;
+mod shortlist;
 
 use std::str::FromStr;
 

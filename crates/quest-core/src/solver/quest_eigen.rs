@@ -1,14 +1,51 @@
-//! `quest-eigen`: the eigenvalue method of section 7.1.
+//! `quest-eigen`: rotations as eigenvalues, section 7.1 of
+//!
+//! K. Fathian, J. Jin, S.-G. Wee, D.-H. Lee, Y.-G. Kim, N. R. Gans, *Camera relative pose estimation for visual
+//! servoing using quaternions*, Robotics and Autonomous Systems (2018), doi 10.1016/j.robot.2018.05.014.
+//!
+//! **Problem.** The quaternions `q` at which the quartics (39) of five matches vanish: twenty complex ones in
+//! general, two for each of the ten essential matrices.
+//!
+//! **Steps**, and where they leave the paper:
+//! 1. Rotate view 2 by a fixed generic rotation. The paper divides by `q1`, which is zero for every half turn and for
+//!    the twisted partner of every pure translation.
+//! 2. The fifteen quartics of [`quaternion`](crate::quaternion), in place of the ten of (39) times `q1…q4`. The
+//!    40 × 56 elimination (41), (42) becomes one of 15 × 35.
+//! 3. With `q1 = 1` it gives the 15 quartic monomials in `q2, q3, q4` by the 20 lower ones: multiplication by
+//!    `q2 / q1` in that basis is the 20 × 20 matrix that stands for the 35 × 35 matrix `B` of (44).
+//! 4. Its eigenvalues are `q2 / q1` at the twenty solutions; the other components are the null vector of ten of the
+//!    equations, ten unknowns each. Complex eigenvalues give complex quaternions, of which the real part is kept.
+//! 5. Newton's iteration on rotation and translation; the twisted partner comes for free.
+//!
+//! For more than five matches the quartics are those of the five constraints that fit all matches best, and
+//! every solution is refined over all matches.
+//!
+//! **Degenerate**: fewer than five independent constraints; an exact pure rotation. With little parallax all
+//! solutions run together and the eigenvalues lose their digits.
 
+use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
+
+use super::constraints::{Gram, of_five};
+use super::motion::{Motion, Outcome};
+use super::shortlist::{Shortlist, pure_rotation, rotation_only};
 use super::{Kinds, PoseSolver};
-use crate::{Candidates, Correspondence, Degeneracy};
+use crate::algebra::{eigenvalues::eigenvalues, elimination};
+use crate::alignment::best_rotation;
+use crate::quaternion::monomials::{MONOMIALS, Quartic, position};
+use crate::quaternion::{bilinear, minors_with_q, minors_without_q, ten_quartics};
+use crate::structure::translation_direction;
+use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
-/// The eigenvalue method of section 7.1 of the paper.
+/// The eigenvalue method of section 7.1 of the paper; see the [module](self) for its steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct QuestEigen {
     /// Which candidates are returned.
     pub kinds: Kinds,
 }
+
+/// Fixed rotations of view 2, as quaternions without symmetry; the second serves where the first does badly.
+const PRE_ROTATIONS: [[f64; 4]; 3] =
+    [[0.39, 0.57, -0.31, 0.65], [0.61, -0.27, 0.54, -0.51], [-0.23, 0.44, 0.71, 0.50]];
 
 impl PoseSolver for QuestEigen {
     const NAME: &'static str = "quest-eigen";
@@ -17,7 +54,229 @@ impl PoseSolver for QuestEigen {
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         out.clear();
         if matches.len() < Self::MIN_MATCHES {
-            out.set_degeneracy(Degeneracy::TooFewMatches);
+            return out.set_degeneracy(Degeneracy::TooFewMatches);
+        }
+        let aligned = best_rotation(matches);
+        if pure_rotation(aligned, matches, out) {
+            return;
+        }
+        let found = match matches.try_into() {
+            Ok(five) => from_five(five),
+            Err(_) => from_many(matches),
+        };
+        match found {
+            Err(degeneracy) => out.set_degeneracy(degeneracy),
+            Ok(shortlist) => {
+                if self.kinds == Kinds::All {
+                    out.push(rotation_only(aligned, matches));
+                }
+                shortlist.write(self.kinds, matches, out);
+            }
         }
     }
+}
+
+/// The solutions of five matches.
+fn from_five(matches: &[Correspondence; 5]) -> Result<Shortlist, Degeneracy> {
+    let constraints = of_five(matches)?;
+    let mut shortlist = Shortlist::new();
+    for g in PRE_ROTATIONS.map(pre_rotation) {
+        let turned = matches.map(|m| m.with_view2_rotated(&g));
+        let m = constraints.map(|y| bilinear(&(g.to_rotation_matrix() * y)));
+        let Some(spectrum) = Spectrum::new(&ten_quartics(&turned), &minors_without_q(&m)) else { continue };
+        shortlist.retain(CandidateKind::Exact);
+        if spectrum.collect(&g, matches, &mut shortlist) {
+            break;
+        }
+    }
+    Ok(shortlist)
+}
+
+/// The local minima over more than five matches.
+fn from_many(matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
+    let gram = Gram::new(matches);
+    let constraints = gram.leading_five(matches)?;
+    let mut starts = Shortlist::new();
+    let g = pre_rotation(PRE_ROTATIONS[0]);
+    let m = constraints.map(|y| bilinear(&(g.to_rotation_matrix() * y)));
+    if let Some(spectrum) = Spectrum::new(&minors_with_q(&m), &minors_without_q(&m)) {
+        for value in spectrum.values {
+            if let Some((kind, q_21)) = spectrum.rotation(value, &g) {
+                starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
+            }
+        }
+    }
+    Ok(starts.refined(&gram, matches))
+}
+
+fn pre_rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
+}
+
+/// The columns of the elimination: first the 15 monomials without `q1`, those without `q2` ahead of the others, then
+/// the 20 monomials with `q1`, the basis.
+const COLUMNS: [usize; 35] = {
+    let mut columns = [0; 35];
+    let mut n = 0;
+    let mut group = 0;
+    while group < 3 {
+        let mut k = 0;
+        while k < 35 {
+            let e = MONOMIALS[k];
+            let of = if e[0] > 0 { 2 } else { (e[1] > 0) as usize };
+            if of == group {
+                columns[n] = k;
+                n += 1;
+            }
+            k += 1;
+        }
+        group += 1;
+    }
+    columns
+};
+
+/// How many of the leading columns do not contain `q2`: their rows are not needed.
+const WITHOUT_Q2: usize = 5;
+
+/// The exponents of the basis.
+const BASIS: [[u8; 4]; 20] = {
+    let mut basis = [[0; 4]; 20];
+    let mut k = 0;
+    while k < 20 {
+        basis[k] = MONOMIALS[COLUMNS[15 + k]];
+        k += 1;
+    }
+    basis
+};
+
+/// Where `q2 / q1` takes each monomial of the basis: a position among [`COLUMNS`].
+const TIMES_RATIO: [usize; 20] = {
+    let mut table = [0; 20];
+    let mut k = 0;
+    while k < 20 {
+        let [a, b, c, d] = BASIS[k];
+        let wanted = position(&MONOMIALS, [a - 1, b + 1, c, d]);
+        while COLUMNS[table[k]] != wanted {
+            table[k] += 1;
+        }
+        k += 1;
+    }
+    table
+};
+
+/// The monomials in `q3, q4` of degree 3 and less, the constant last, by the exponents of both.
+const TAIL: [[u8; 2]; 10] =
+    [[3, 0], [2, 1], [1, 2], [0, 3], [2, 0], [1, 1], [0, 2], [1, 0], [0, 1], [0, 0]];
+
+/// Which of [`TAIL`] each monomial of the basis contains.
+const TAIL_OF: [usize; 20] = {
+    let mut table = [0; 20];
+    let mut k = 0;
+    while k < 20 {
+        while TAIL[table[k]][0] != BASIS[k][2] || TAIL[table[k]][1] != BASIS[k][3] {
+            table[k] += 1;
+        }
+        k += 1;
+    }
+    table
+};
+
+/// Multiplication by `q2 / q1` modulo the quartics, and its eigenvalues.
+struct Spectrum {
+    action: [[f64; 20]; 20],
+    values: [Complex<f64>; 20],
+}
+
+impl Spectrum {
+    /// `None` where the quartics are dependent.
+    fn new(with_q: &[Quartic; 10], without_q: &[Quartic; 5]) -> Option<Self> {
+        let mut a = [[0.0; 35]; 15];
+        for (row, quartic) in a.iter_mut().zip(with_q.iter().chain(without_q)) {
+            for (x, column) in row.iter_mut().zip(COLUMNS) {
+                *x = quartic[column];
+            }
+        }
+        if elimination::reduce(&mut a, WITHOUT_Q2) == 0.0 {
+            return None;
+        }
+        let mut action = [[0.0; 20]; 20];
+        for (row, target) in action.iter_mut().zip(TIMES_RATIO) {
+            if target < 15 {
+                for (x, reduced) in row.iter_mut().zip(&a[target][15..]) {
+                    *x = -reduced;
+                }
+            } else {
+                row[target - 15] = 1.0;
+            }
+        }
+        let values = eigenvalues(&mut action.clone())?;
+        Some(Self { action, values })
+    }
+
+    /// The quaternion `(1, q2, q3, q4)` for `q2 = value`: the null vector of the equations for the monomials that
+    /// leave the basis, ten equations in the ten monomials of `q3` and `q4`.
+    fn quaternion<T: ComplexField<RealField = f64> + Copy>(&self, value: T) -> Option<[T; 4]> {
+        let powers = [T::one(), value, value * value, value * value * value];
+        let mut a = [[T::zero(); 10]; 10];
+        let leaving = (0..20).filter(|&k| TIMES_RATIO[k] < 15);
+        for (row, k) in a.iter_mut().zip(leaving) {
+            for j in 0..20 {
+                row[TAIL_OF[j]] += powers[usize::from(BASIS[j][1])] * T::from_real(self.action[k][j]);
+            }
+            row[TAIL_OF[k]] -= value * powers[usize::from(BASIS[k][1])];
+        }
+        let x = elimination::null_vector(&mut a)?;
+        Some([T::one(), value, x[7], x[8]])
+    }
+
+    /// The rotation of an eigenvalue, with the pre-rotation undone: of a complex pair the real part, once.
+    fn rotation(
+        &self,
+        value: Complex<f64>,
+        g: &UnitQuaternion<f64>,
+    ) -> Option<(CandidateKind, UnitQuaternion<f64>)> {
+        let (kind, [w, x, y, z]) = if value.im == 0.0 {
+            (CandidateKind::Exact, self.quaternion(value.re)?)
+        } else if value.im > 0.0 {
+            (CandidateKind::FromComplex, real_part(self.quaternion(value)?))
+        } else {
+            return None;
+        };
+        let q = g.inverse() * UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        q.coords.iter().all(|c| c.is_finite()).then_some((kind, q))
+    }
+
+    /// Adds the solution of every eigenvalue. Whether all of the real ones were found.
+    fn collect(
+        &self,
+        g: &UnitQuaternion<f64>,
+        matches: &[Correspondence; 5],
+        shortlist: &mut Shortlist,
+    ) -> bool {
+        let mut complete = true;
+        for value in self.values {
+            let Some((kind, q_21)) = self.rotation(value, g) else {
+                complete &= value.im < 0.0;
+                continue;
+            };
+            let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
+            if kind == CandidateKind::Exact {
+                complete &= shortlist.push_solution(motion, matches) == Outcome::Converged;
+            } else {
+                shortlist.push(kind, motion);
+            }
+        }
+        let real = self.values.iter().filter(|value| value.im == 0.0).count();
+        complete && shortlist.count(CandidateKind::Exact) >= real
+    }
+}
+
+/// The real part of a complex quaternion, scaled by the phase that leaves the most of it.
+///
+/// `q·q` without conjugation turns by twice the phase, so the choice does not depend on the frames. The paper's text
+/// leaves it open; making the largest component real depends on them.
+fn real_part(q: [Complex<f64>; 4]) -> [f64; 4] {
+    let square: Complex<f64> = q.iter().map(|x| x * x).sum();
+    let phase = Complex::from_polar(1.0, -0.5 * square.arg());
+    q.map(|x| (x * phase).re)
 }

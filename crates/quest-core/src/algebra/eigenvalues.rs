@@ -1,0 +1,378 @@
+//! All eigenvalues of a small real matrix: balancing, reduction to Hessenberg form, shifted QR.
+//!
+//! The classical sequence of Wilkinson and Reinsch, *Handbook for Automatic Computation II* (1971),
+//! contributions II/11 (balancing), II/13 (elimination to Hessenberg form) and II/14 (Francis' implicit double
+//! shift), for row-major arrays of fixed size and for eigenvalues alone.
+
+use nalgebra::Complex;
+
+/// Sweeps a single eigenvalue may take before the matrix is given up; about three are usual.
+const MAX_SWEEPS: usize = 60;
+
+/// The eigenvalues of `a`, complex pairs next to each other; `a` is overwritten.
+///
+/// `None` where the iteration does not converge, as for a matrix that is not finite.
+pub(crate) fn eigenvalues<const N: usize>(a: &mut [[f64; N]; N]) -> Option<[Complex<f64>; N]> {
+    if a.iter().flatten().any(|x| !x.is_finite()) {
+        return None;
+    }
+    balance(a);
+    to_hessenberg(a);
+    hessenberg_eigenvalues(a)
+}
+
+/// Scales rows and columns by powers of two until they have about the same size: no rounding.
+fn balance<const N: usize>(a: &mut [[f64; N]; N]) {
+    const RADIX: f64 = 2.0;
+    let mut settled = false;
+    // A bound in place of "until nothing changes": a matrix with a zero row against a tiny column crawls.
+    for _ in 0..20 {
+        if settled {
+            break;
+        }
+        settled = true;
+        for i in 0..N {
+            let (mut row, mut column) = (0.0, 0.0);
+            for j in 0..N {
+                if j != i {
+                    row += a[i][j].abs();
+                    column += a[j][i].abs();
+                }
+            }
+            if row == 0.0 || column == 0.0 {
+                continue;
+            }
+            let (total, mut factor) = (row + column, 1.0);
+            while column < row / RADIX && factor < 1e100 {
+                factor *= RADIX;
+                column *= RADIX * RADIX;
+            }
+            while column >= row * RADIX && factor > 1e-100 {
+                factor /= RADIX;
+                column /= RADIX * RADIX;
+            }
+            if (column + row) / factor < 0.95 * total {
+                settled = false;
+                for j in 0..N {
+                    a[i][j] /= factor;
+                }
+                for j in 0..N {
+                    a[j][i] *= factor;
+                }
+            }
+        }
+    }
+}
+
+/// Reduces to upper Hessenberg form by stabilised elementary similarity transformations: half the work of
+/// reflections. What is left below the subdiagonal is not read again.
+fn to_hessenberg<const N: usize>(a: &mut [[f64; N]; N]) {
+    for m in 1..N.saturating_sub(1) {
+        let pivot = (m..N).fold(m, |best, i| if a[i][m - 1].abs() > a[best][m - 1].abs() { i } else { best });
+        if a[pivot][m - 1] == 0.0 {
+            continue;
+        }
+        if pivot != m {
+            a.swap(pivot, m);
+            for row in a.iter_mut() {
+                row.swap(pivot, m);
+            }
+        }
+        let pivot_row = a[m];
+        let inverse = 1.0 / pivot_row[m - 1];
+        let mut factors = [0.0; N];
+        for i in m + 1..N {
+            let factor = a[i][m - 1] * inverse;
+            factors[i] = factor;
+            for j in m..N {
+                a[i][j] -= factor * pivot_row[j];
+            }
+        }
+        for row in a.iter_mut() {
+            let mut sum = row[m];
+            for j in m + 1..N {
+                sum += factors[j] * row[j];
+            }
+            row[m] = sum;
+        }
+    }
+}
+
+/// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration.
+fn hessenberg_eigenvalues<const N: usize>(h: &mut [[f64; N]; N]) -> Option<[Complex<f64>; N]> {
+    let mut values = [Complex::new(0.0, 0.0); N];
+    let mut norm = 0.0;
+    for i in 0..N {
+        for j in i.saturating_sub(1)..N {
+            norm += h[i][j].abs();
+        }
+    }
+    let (mut active, mut exceptional_shift, mut sweep) = (N, 0.0, 0);
+    while active > 0 {
+        let last = active - 1;
+        let first = block_start(h, last, norm);
+        let corner = h[last][last];
+        if first == last {
+            values[last] = Complex::new(corner + exceptional_shift, 0.0);
+            (active, sweep) = (last, 0);
+            continue;
+        }
+        let above = h[last - 1][last - 1];
+        let product = h[last][last - 1] * h[last - 1][last];
+        if first + 1 == last {
+            let (x, y) = pair(above, corner, product);
+            values[last - 1] = x + exceptional_shift;
+            values[last] = y + exceptional_shift;
+            (active, sweep) = (last - 1, 0);
+            continue;
+        }
+        if sweep == MAX_SWEEPS {
+            return None;
+        }
+        let mut shift = Shift { x: corner, y: above, w: product };
+        if sweep % 10 == 9 {
+            // The iteration stalls on matrices that its own shift leaves alone: an unrelated one moves it.
+            exceptional_shift += corner;
+            for i in 0..active {
+                h[i][i] -= corner;
+            }
+            let s = h[last][last - 1].abs() + h[last - 1][last - 2].abs();
+            shift = Shift { x: 0.75 * s, y: 0.75 * s, w: -0.4375 * s * s };
+        }
+        sweep += 1;
+        francis_sweep(h, first, last, &shift);
+    }
+    Some(values)
+}
+
+/// The first row of the unreduced block that ends at `last`.
+fn block_start<const N: usize>(h: &[[f64; N]; N], last: usize, norm: f64) -> usize {
+    for l in (1..=last).rev() {
+        let mut neighbours = h[l - 1][l - 1].abs() + h[l][l].abs();
+        if neighbours == 0.0 {
+            neighbours = norm;
+        }
+        if h[l][l - 1].abs() <= f64::EPSILON * 0.5 * neighbours {
+            return l;
+        }
+    }
+    0
+}
+
+/// The eigenvalues of `[[above, b], [c, corner]]` with `product = b c`.
+fn pair(above: f64, corner: f64, product: f64) -> (Complex<f64>, Complex<f64>) {
+    let p = 0.5 * (above - corner);
+    let q = p * p + product;
+    let z = q.abs().sqrt();
+    if q < 0.0 {
+        return (Complex::new(corner + p, z), Complex::new(corner + p, -z));
+    }
+    let z = p + z.copysign(p);
+    let other = if z == 0.0 { corner } else { corner - product / z };
+    (Complex::new(corner + z, 0.0), Complex::new(other, 0.0))
+}
+
+/// The two shifts, as the trace and product of a trailing 2 × 2 block need them.
+struct Shift {
+    x: f64,
+    y: f64,
+    w: f64,
+}
+
+/// The start of the bulge: where two consecutive subdiagonal entries are small it may begin further down.
+fn bulge_start<const N: usize>(
+    h: &[[f64; N]; N],
+    first: usize,
+    last: usize,
+    shift: &Shift,
+) -> (usize, [f64; 3]) {
+    let mut m = last - 2;
+    loop {
+        let z = h[m][m];
+        let (r, s) = (shift.x - z, shift.y - z);
+        let mut v =
+            [(r * s - shift.w) / h[m + 1][m] + h[m][m + 1], h[m + 1][m + 1] - z - r - s, h[m + 2][m + 1]];
+        let size = v[0].abs() + v[1].abs() + v[2].abs();
+        for x in &mut v {
+            *x /= size;
+        }
+        if m == first {
+            return (m, v);
+        }
+        let small = h[m][m - 1].abs() * (v[1].abs() + v[2].abs());
+        let large = v[0].abs() * (h[m - 1][m - 1].abs() + z.abs() + h[m + 1][m + 1].abs());
+        if small <= f64::EPSILON * 0.5 * large {
+            return (m, v);
+        }
+        m -= 1;
+    }
+}
+
+/// One implicit double-shift sweep on the block `first..=last`: a 3 × 3 bulge is chased down by reflections.
+fn francis_sweep<const N: usize>(h: &mut [[f64; N]; N], first: usize, last: usize, shift: &Shift) {
+    let (start, mut v) = bulge_start(h, first, last, shift);
+    for i in start + 2..=last {
+        h[i][i - 2] = 0.0;
+        if i > start + 2 {
+            h[i][i - 3] = 0.0;
+        }
+    }
+    for k in start..last {
+        let three = k + 1 < last;
+        let mut size = 1.0;
+        if k != start {
+            v = [h[k][k - 1], h[k + 1][k - 1], if three { h[k + 2][k - 1] } else { 0.0 }];
+            size = v[0].abs() + v[1].abs() + v[2].abs();
+            if size == 0.0 {
+                continue;
+            }
+            v = v.map(|x| x / size);
+        }
+        let s = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt().copysign(v[0]);
+        if s == 0.0 {
+            continue;
+        }
+        if k != start {
+            h[k][k - 1] = -s * size;
+        } else if first != start {
+            h[k][k - 1] = -h[k][k - 1];
+        }
+        // The reflection I − u wᵀ with u = (v + s e1) / s and w = u normalised to w_0 = 1.
+        let p = v[0] + s;
+        let u = [p / s, v[1] / s, v[2] / s];
+        let w = [1.0, v[1] / p, v[2] / p];
+        reflect_rows(h, k, last, three, u, w);
+        reflect_columns(h, k, first, last, three, u, w);
+    }
+}
+
+/// Applies the reflection to rows `k`, `k + 1` and, where there are three, `k + 2`.
+#[inline]
+fn reflect_rows<const N: usize>(
+    h: &mut [[f64; N]; N],
+    k: usize,
+    last: usize,
+    three: bool,
+    u: [f64; 3],
+    w: [f64; 3],
+) {
+    let (upper, lower) = h.split_at_mut(k + 1);
+    let row0 = &mut upper[k];
+    if three {
+        let (one, two) = lower.split_at_mut(1);
+        for j in k..=last {
+            let sum = row0[j] + w[1] * one[0][j] + w[2] * two[0][j];
+            row0[j] -= sum * u[0];
+            one[0][j] -= sum * u[1];
+            two[0][j] -= sum * u[2];
+        }
+    } else {
+        let row1 = &mut lower[0];
+        for j in k..=last {
+            let sum = row0[j] + w[1] * row1[j];
+            row0[j] -= sum * u[0];
+            row1[j] -= sum * u[1];
+        }
+    }
+}
+
+/// Applies the reflection to columns `k`, `k + 1` and, where there are three, `k + 2`.
+#[inline]
+fn reflect_columns<const N: usize>(
+    h: &mut [[f64; N]; N],
+    k: usize,
+    first: usize,
+    last: usize,
+    three: bool,
+    u: [f64; 3],
+    w: [f64; 3],
+) {
+    let bottom = if last < k + 3 { last } else { k + 3 };
+    for row in &mut h[first..=bottom] {
+        if three {
+            let sum = u[0] * row[k] + u[1] * row[k + 1] + u[2] * row[k + 2];
+            row[k] -= sum;
+            row[k + 1] -= sum * w[1];
+            row[k + 2] -= sum * w[2];
+        } else {
+            let sum = u[0] * row[k] + u[1] * row[k + 1];
+            row[k] -= sum;
+            row[k + 1] -= sum * w[1];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn agrees_with_faer<const N: usize>(a: &[[f64; N]; N]) {
+        let ours = eigenvalues(&mut a.clone()).unwrap();
+        let theirs = faer::Mat::from_fn(N, N, |i, j| a[i][j]).eigenvalues().unwrap();
+        let mut left: Vec<_> = theirs.iter().map(|z| Complex::new(z.re, z.im)).collect();
+        let norm = a.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+        for z in ours {
+            let (k, distance) = left
+                .iter()
+                .enumerate()
+                .map(|(k, y)| (k, (y - z).norm()))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap();
+            // Backward stable to N ε |A|; an eigenvalue of a random matrix has a condition number of
+            // up to some thousand, and both sides err.
+            assert!(distance < 1e-9 * norm, "{z} is off by {distance:e}");
+            left.swap_remove(k);
+        }
+    }
+
+    #[test]
+    fn random_matrices_agree_with_faer() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..200 {
+            let mut a = [[0.0; 20]; 20];
+            for x in a.as_flattened_mut() {
+                *x = rng.random_range(-1.0..1.0);
+            }
+            agrees_with_faer(&a);
+            let b: [[f64; 10]; 10] = std::array::from_fn(|i| std::array::from_fn(|j| a[i][j]));
+            agrees_with_faer(&b);
+        }
+    }
+
+    #[test]
+    fn companion_matrix_has_the_planted_roots() {
+        // (x − 1)(x − 2)…(x − 6): the shift that stalls on a cyclic permutation is exercised below.
+        let coefficients = [21.0, -175.0, 735.0, -1624.0, 1764.0, -720.0];
+        let mut a = [[0.0; 6]; 6];
+        a[0] = coefficients;
+        for i in 1..6 {
+            a[i][i - 1] = 1.0;
+        }
+        let mut values: Vec<_> = eigenvalues(&mut a).unwrap().iter().map(|z| z.re).collect();
+        values.sort_by(f64::total_cmp);
+        for (k, x) in values.iter().enumerate() {
+            assert!((x - (k + 1) as f64).abs() < 1e-9, "{x}");
+        }
+    }
+
+    #[test]
+    fn cyclic_permutation_has_the_roots_of_unity() {
+        let mut a = [[0.0; 8]; 8];
+        for i in 0..8 {
+            a[i][(i + 1) % 8] = 1.0;
+        }
+        for z in eigenvalues(&mut a).unwrap() {
+            assert!((z.powu(8) - Complex::new(1.0, 0.0)).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn matrices_that_are_not_finite_are_refused() {
+        let mut a = [[1.0; 4]; 4];
+        a[2][1] = f64::NAN;
+        assert!(eigenvalues(&mut a).is_none());
+        assert_eq!(eigenvalues(&mut [[0.0; 4]; 4]).unwrap(), [Complex::new(0.0, 0.0); 4]);
+    }
+}

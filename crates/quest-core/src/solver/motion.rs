@@ -1,0 +1,266 @@
+//! A rotation and a direction of translation, refined on their manifold: five parameters.
+//!
+//! The residual of a match is the epipolar constraint `r = t · (b × c)`, `c = R a`, with unit `t`. For a rotation by
+//! a small vector `ω` after `R`, and a move of `t` by `δ1 e1 + δ2 e2` in its tangent plane,
+//!
+//! ```text
+//! dr = ω · (c × (t × b)) + δ1 n · e1 + δ2 n · e2,   n = b × c
+//! ```
+
+use nalgebra::{Matrix5, SMatrix, UnitQuaternion, Vector3, Vector5};
+
+use super::constraints::Gram;
+use crate::Correspondence;
+use crate::algebra::elimination;
+
+/// A step shorter than this (radians) is rounding.
+const CONVERGED: f64 = 1e-13;
+
+/// A relative pose without the length of its translation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion {
+    /// The rotation.
+    pub(crate) q_21: UnitQuaternion<f64>,
+    /// The direction of the translation, a unit vector of either sign.
+    pub(crate) direction: Vector3<f64>,
+}
+
+/// How an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// The last step was rounding.
+    Converged,
+    /// The steps ran out, or led away.
+    Stalled,
+}
+
+impl Motion {
+    /// The other rotation with the same essential matrix: turned by 180° about the translation, `q' = t ⊗ q`.
+    pub(crate) fn twisted(&self) -> Self {
+        let q = nalgebra::Quaternion::from_imag(self.direction) * self.q_21.into_inner();
+        Self { q_21: UnitQuaternion::new_normalize(q), direction: self.direction }
+    }
+
+    /// Whether two motions have the same essential matrix and rotation, to `tolerance` in radians. Both parts
+    /// are needed: with little parallax all solutions have nearly the same rotation.
+    pub(crate) fn is_close(&self, other: &Self, tolerance: f64) -> bool {
+        let cosine = self.q_21.coords.dot(&other.q_21.coords).abs();
+        self.direction.cross(&other.direction).norm() < tolerance
+            && (1.0 - cosine) < 0.125 * tolerance * tolerance + 4.0 * f64::EPSILON
+    }
+
+    fn moved(&self, tangent: &[Vector3<f64>; 2], step: &[f64; 5]) -> Self {
+        let turn = UnitQuaternion::new(Vector3::new(step[0], step[1], step[2]));
+        let direction = self.direction + tangent[0] * step[3] + tangent[1] * step[4];
+        Self {
+            q_21: UnitQuaternion::new_normalize((turn * self.q_21).into_inner()),
+            direction: direction.normalize(),
+        }
+    }
+
+    /// Newton's iteration to the solution of five constraints.
+    pub(crate) fn solve_five(&mut self, matches: &[Correspondence; 5], max_steps: usize) -> Outcome {
+        for _ in 0..max_steps {
+            let tangent = tangent_basis(&self.direction);
+            let r_21 = self.q_21.to_rotation_matrix();
+            let (mut jacobian, mut step) = ([[0.0; 5]; 5], [0.0; 5]);
+            for (i, m) in matches.iter().enumerate() {
+                let row = Row::new(m.bearing2(), &(r_21 * m.bearing1()), &self.direction, &tangent);
+                jacobian[i] = row.gradient.into();
+                step[i] = -row.residual;
+            }
+            let singular = !elimination::solve(&mut jacobian, &mut step);
+            let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if singular || length > 1.0 {
+                return Outcome::Stalled;
+            }
+            *self = self.moved(&tangent, &step);
+            // Quadratic: the error left is the square of the step.
+            if length < 1e-8 {
+                return Outcome::Converged;
+            }
+        }
+        Outcome::Stalled
+    }
+
+    /// Levenberg–Marquardt to a local minimum of the summed squares of the constraints, by their Gram matrix: the
+    /// cost of a step does not depend on the number of matches.
+    pub(crate) fn minimise_gram(&mut self, gram: &Gram, max_steps: usize) {
+        let (mut damping, mut cost) = (1e-4, gram.cost(self));
+        for _ in 0..max_steps {
+            let tangent = tangent_basis(&self.direction);
+            let (hessian, gradient) = gram.normal_equations(self, &tangent);
+            let mut length = 0.0;
+            for _ in 0..8 {
+                let Some(step) = damped_step(&hessian, &gradient, damping) else { break };
+                let trial = self.moved(&tangent, &step.into());
+                let trial_cost = gram.cost(&trial);
+                if trial_cost <= cost {
+                    length = step.norm();
+                    (*self, cost) = (trial, trial_cost);
+                    damping *= 0.1;
+                    break;
+                }
+                damping *= 10.0;
+            }
+            // The squared cost resolves half the digits; the residuals themselves finish the work.
+            if length < 1e-7 {
+                break;
+            }
+        }
+    }
+
+    /// Gauss–Newton on the Sampson errors of all matches, with their weights held in each step. Keeps the
+    /// start where it does not lead to a smaller residual.
+    pub(crate) fn minimise_sampson(&mut self, matches: &[Correspondence], max_steps: usize) {
+        let (mut best, mut trial, mut damping) = (f64::INFINITY, *self, 0.0);
+        for _ in 0..max_steps {
+            let tangent = tangent_basis(&trial.direction);
+            let (cost, hessian, gradient) = trial.sampson_equations(matches, &tangent);
+            if cost < best {
+                (best, *self) = (cost, trial);
+                damping *= 0.1;
+            } else {
+                break;
+            }
+            let Some(step) = damped_step(&hessian, &gradient, damping) else { break };
+            trial = trial.moved(&tangent, &step.into());
+            if step.norm() < CONVERGED {
+                break;
+            }
+        }
+    }
+
+    /// The summed squares of the Sampson errors, and the normal equations of a step.
+    fn sampson_equations(
+        &self,
+        matches: &[Correspondence],
+        tangent: &[Vector3<f64>; 2],
+    ) -> (f64, Matrix5<f64>, Vector5<f64>) {
+        let r_21 = self.q_21.to_rotation_matrix();
+        let (mut cost, mut hessian, mut gradient) = (0.0, Matrix5::zeros(), Vector5::zeros());
+        for m in matches {
+            let (b, c) = (m.bearing2(), r_21 * m.bearing1());
+            let row = Row::new(b, &c, &self.direction, tangent);
+            let slope = self.direction.cross(&c).norm_squared() + self.direction.cross(b).norm_squared()
+                - 2.0 * row.residual * row.residual;
+            // At an epipole the constraint says nothing.
+            let weight = if slope > f64::EPSILON { 1.0 / slope } else { 0.0 };
+            cost += weight * row.residual * row.residual;
+            hessian += row.gradient * row.gradient.transpose() * weight;
+            gradient += row.gradient * (weight * row.residual);
+        }
+        (cost, hessian, gradient)
+    }
+}
+
+/// The residual of one match and its derivative by the five parameters.
+struct Row {
+    residual: f64,
+    gradient: Vector5<f64>,
+}
+
+impl Row {
+    #[inline]
+    fn new(b: &Vector3<f64>, c: &Vector3<f64>, t: &Vector3<f64>, tangent: &[Vector3<f64>; 2]) -> Self {
+        let n = b.cross(c);
+        let g = c.cross(&t.cross(b));
+        Self {
+            residual: n.dot(t),
+            gradient: Vector5::new(g.x, g.y, g.z, n.dot(&tangent[0]), n.dot(&tangent[1])),
+        }
+    }
+}
+
+/// Two unit vectors that complete `t` to a right-handed frame (Duff et al., JCGT 2017): no branch that fails.
+pub(crate) fn tangent_basis(t: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let sign = 1.0_f64.copysign(t.z);
+    let a = -1.0 / (sign + t.z);
+    let b = t.x * t.y * a;
+    [
+        Vector3::new(1.0 + sign * t.x * t.x * a, sign * b, -sign * t.x),
+        Vector3::new(b, sign + t.y * t.y * a, -t.y),
+    ]
+}
+
+/// The step `−(H + damping · diag H)⁻¹ g`, where it exists.
+fn damped_step(hessian: &Matrix5<f64>, gradient: &Vector5<f64>, damping: f64) -> Option<Vector5<f64>> {
+    let mut damped = *hessian;
+    for k in 0..5 {
+        damped[(k, k)] *= 1.0 + damping;
+    }
+    let step = -damped.cholesky()?.solve(gradient);
+    step.iter().all(|x| x.is_finite()).then_some(step)
+}
+
+/// The derivative of the essential matrix `[t]× R`, row by row, by the five parameters: 9 × 5.
+pub(crate) fn essential_jacobian(motion: &Motion, tangent: &[Vector3<f64>; 2]) -> SMatrix<f64, 9, 5> {
+    let r_21 = motion.q_21.to_rotation_matrix().into_inner();
+    let cross = motion.direction.cross_matrix();
+    let mut jacobian = SMatrix::<f64, 9, 5>::zeros();
+    for k in 0..5 {
+        let derivative = match k {
+            0..3 => cross * Vector3::ith(k, 1.0).cross_matrix() * r_21,
+            _ => tangent[k - 3].cross_matrix() * r_21,
+        };
+        for i in 0..3 {
+            for j in 0..3 {
+                jacobian[(3 * i + j, k)] = derivative[(i, j)];
+            }
+        }
+    }
+    jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion() -> Motion {
+        let q_21 = UnitQuaternion::new(Vector3::new(0.3, -0.2, 0.5));
+        Motion { q_21, direction: Vector3::new(0.6, 0.0, -0.8) }
+    }
+
+    #[test]
+    fn tangent_basis_is_orthonormal_everywhere() {
+        for t in [Vector3::z(), -Vector3::z(), Vector3::x(), Vector3::new(0.6, 0.0, -0.8)] {
+            let [e1, e2] = tangent_basis(&t);
+            assert!((e1.cross(&e2) - t).norm() < 1e-15 && e1.dot(&e2).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn gradient_is_the_limit_of_differences() {
+        let m = motion();
+        let tangent = tangent_basis(&m.direction);
+        let (b, a) = (Vector3::new(0.2, 0.5, 0.8).normalize(), Vector3::new(-0.1, 0.4, 0.9).normalize());
+        let at = |m: &Motion| Row::new(&b, &(m.q_21 * a), &m.direction, &tangent_basis(&m.direction)).residual;
+        let row = Row::new(&b, &(m.q_21 * a), &m.direction, &tangent);
+        let essential = |m: &Motion| m.direction.cross_matrix() * m.q_21.to_rotation_matrix().into_inner();
+        let jacobian = essential_jacobian(&m, &tangent);
+        let h = 1e-6;
+        for k in 0..5 {
+            let mut step = [0.0; 5];
+            step[k] = h;
+            let plus = m.moved(&tangent, &step);
+            step[k] = -h;
+            let minus = m.moved(&tangent, &step);
+            // Central differences: h² of truncation, ε / h of rounding.
+            assert!((row.gradient[k] - (at(&plus) - at(&minus)) / (2.0 * h)).abs() < 1e-9);
+            let difference = (essential(&plus) - essential(&minus)) / (2.0 * h);
+            for i in 0..3 {
+                for j in 0..3 {
+                    assert!((jacobian[(3 * i + j, k)] - difference[(i, j)]).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn twisted_motions_share_the_essential_matrix() {
+        let m = motion();
+        let essential = |m: &Motion| m.direction.cross_matrix() * m.q_21.to_rotation_matrix().into_inner();
+        assert!((essential(&m) + essential(&m.twisted())).norm() < 1e-15);
+        assert!(m.is_close(&m.twisted().twisted(), 1e-12) && !m.is_close(&m.twisted(), 0.1));
+    }
+}

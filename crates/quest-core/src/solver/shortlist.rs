@@ -1,0 +1,145 @@
+//! From the rotations that a solver finds to the ranked list of candidates: what all solvers share.
+
+use nalgebra::UnitQuaternion;
+
+use super::Kinds;
+use super::constraints::Gram;
+use super::motion::{Motion, Outcome};
+use crate::structure::{translation_direction, with_depths};
+use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
+
+/// Solutions closer than this, in rotation and in direction of translation (radians), are one.
+const SAME: f64 = 1e-6;
+
+/// Residuals below this are zero: rounding, not quality, and must not decide the order.
+const ROUNDING: f64 = 1e-12;
+
+/// A rotation alone explains bearings this close (radians, root mean square).
+const NO_PARALLAX: f64 = 1e-13;
+
+/// Motions found so far, without duplicates.
+#[derive(Clone, Debug)]
+pub(crate) struct Shortlist {
+    items: [Option<(CandidateKind, Motion)>; Candidates::CAPACITY],
+    len: usize,
+}
+
+impl Shortlist {
+    pub(crate) fn new() -> Self {
+        Self { items: [None; Candidates::CAPACITY], len: 0 }
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &(CandidateKind, Motion)> {
+        self.items[..self.len].iter().flatten()
+    }
+
+    /// How many there are of a kind.
+    pub(crate) fn count(&self, kind: CandidateKind) -> usize {
+        self.iter().filter(|(k, _)| *k == kind).count()
+    }
+
+    /// Drops all but one kind.
+    pub(crate) fn retain(&mut self, kind: CandidateKind) {
+        let all = std::mem::replace(self, Self::new());
+        for (_, motion) in all.iter().filter(|(k, _)| *k == kind) {
+            self.push(kind, *motion);
+        }
+    }
+
+    /// Adds a motion unless it is there already. A duplicate counts as exact if either of the two is.
+    pub(crate) fn push(&mut self, kind: CandidateKind, motion: Motion) {
+        for (other_kind, other) in self.items[..self.len].iter_mut().flatten() {
+            if other.is_close(&motion, SAME) {
+                if kind == CandidateKind::Exact && *other_kind != CandidateKind::Exact {
+                    (*other_kind, *other) = (kind, motion);
+                }
+                return;
+            }
+        }
+        if self.len < self.items.len() {
+            self.items[self.len] = Some((kind, motion));
+            self.len += 1;
+        }
+    }
+
+    /// Adds the solution of five constraints near `motion`, and the twisted one beside it; a start from which
+    /// Newton's iteration does not converge is taken as it is, for the real part of a complex solution.
+    pub(crate) fn push_solution(&mut self, mut motion: Motion, matches: &[Correspondence; 5]) -> Outcome {
+        let start = motion;
+        let outcome = motion.solve_five(matches, 10);
+        match outcome {
+            Outcome::Converged => {
+                self.push(CandidateKind::Exact, motion);
+                self.push(CandidateKind::Exact, motion.twisted());
+            }
+            Outcome::Stalled => self.push(CandidateKind::FromComplex, start),
+        }
+        outcome
+    }
+
+    /// The local minima of the squared Sampson errors over all matches that these motions lead to.
+    pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> Self {
+        let mut coarse = Self::new();
+        for (kind, motion) in self.iter() {
+            let mut motion = *motion;
+            motion.minimise_gram(gram, 30);
+            coarse.push(*kind, motion);
+            coarse.push(*kind, motion.twisted());
+        }
+        let mut fine = Self::new();
+        for (kind, motion) in coarse.iter() {
+            let mut motion = *motion;
+            motion.minimise_sampson(matches, 10);
+            fine.push(*kind, motion);
+        }
+        fine
+    }
+
+    /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
+    pub(crate) fn write(&self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
+        for (kind, motion) in self.iter() {
+            if kinds == Kinds::All || *kind == CandidateKind::Exact {
+                out.push(candidate(*kind, motion.q_21, &motion.direction, matches));
+            }
+        }
+        rank(out);
+    }
+}
+
+/// A candidate with its translation's length and sign, its residual and its points in front.
+fn candidate(
+    kind: CandidateKind,
+    q_21: UnitQuaternion<f64>,
+    direction: &nalgebra::Vector3<f64>,
+    matches: &[Correspondence],
+) -> Candidate {
+    let (pose, in_front) = with_depths(q_21, direction, matches);
+    Candidate { kind, pose, residual: pose.residual(matches), in_front }
+}
+
+/// The rotation-only candidate: the best alignment, and the translation that fits it best.
+pub(crate) fn rotation_only(q_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> Candidate {
+    candidate(CandidateKind::RotationOnly, q_21, &translation_direction(&q_21, matches), matches)
+}
+
+/// The candidate of an exact pure rotation, where `q_21` explains the matches to rounding.
+pub(crate) fn pure_rotation(q_21: UnitQuaternion<f64>, matches: &[Correspondence], out: &mut Candidates) -> bool {
+    let pose = RelativePose::new(q_21, nalgebra::Vector3::zeros());
+    let residual = pose.residual(matches);
+    if residual > NO_PARALLAX {
+        return false;
+    }
+    out.set_degeneracy(Degeneracy::PureRotation);
+    let in_front = matches.len();
+    out.push(Candidate { kind: CandidateKind::RotationOnly, pose, residual, in_front });
+    true
+}
+
+/// Best first: most points in front, then the smallest residual, then the smallest rotation.
+fn rank(out: &mut Candidates) {
+    let key = |c: &Candidate| (c.residual.max(ROUNDING), -c.pose.wxyz()[0]);
+    out.as_mut_slice().sort_unstable_by(|x, y| {
+        let ((r, w), (s, v)) = (key(x), key(y));
+        y.in_front.cmp(&x.in_front).then(r.total_cmp(&s)).then(w.total_cmp(&v))
+    });
+}

@@ -1,0 +1,163 @@
+//! Section 8: the translation and all depths with one common scale, at a given rotation.
+//!
+//! With unit bearings `a`, `b`, `c = R a` and `n = b × c`, crossing `z1 c + t = z2 b` with `b` and with `c` gives
+//!
+//! ```text
+//! n · t = 0        z1 = −(b × t) · n / |n|²        z2 = −(c × t) · n / |n|²
+//! ```
+//!
+//! the least-squares depths where the two rays do not meet, and at a solution the null vector of the matrix `B` of
+//! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
+//! `|t|` is then the parallax (63), and goes to zero with it.
+
+use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion, Vector3};
+
+use crate::pose::PARALLEL;
+use crate::{Correspondence, RelativePose};
+
+/// The direction of the translation that fits the rotation best: the eigenvector of `Σ n nᵀ` with the smallest
+/// eigenvalue, either sign. At an exact solution it is orthogonal to every `n`.
+#[must_use]
+pub fn translation_direction(q_21: &UnitQuaternion<f64>, matches: &[Correspondence]) -> Vector3<f64> {
+    let r_21 = q_21.to_rotation_matrix();
+    let mut sum = Matrix3::zeros();
+    for m in matches {
+        let n = m.bearing2().cross(&(r_21 * m.bearing1()));
+        sum += n * n.transpose();
+    }
+    let scale = sum.amax();
+    if scale == 0.0 {
+        return Vector3::z();
+    }
+    let eigen = SymmetricEigen::new(sum / scale);
+    eigen.eigenvectors.column(eigen.eigenvalues.imin()).normalize()
+}
+
+/// The pose with rotation `q_21` and a translation along `direction` (a unit vector, of either sign): the sign
+/// puts more of the points in front of the cameras, the length makes the mean absolute depth 1.
+///
+/// Returns the pose and the number of matches with positive depth in both views. Matches whose rays are
+/// parallel to rounding have no depth and count as in front where the rays point the same way. With no other
+/// matches the translation is zero.
+#[must_use]
+pub fn with_depths(
+    q_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> (RelativePose, usize) {
+    let r_21 = q_21.to_rotation_matrix();
+    let (mut front, mut behind, mut at_infinity) = (0, 0, 0);
+    let (mut absolute, mut signed, mut count) = (0.0, 0.0, 0);
+    for m in matches {
+        let (b, c) = (m.bearing2(), r_21 * m.bearing1());
+        let n = b.cross(&c);
+        let nn = n.norm_squared();
+        if nn <= PARALLEL * PARALLEL {
+            at_infinity += usize::from(b.dot(&c) > 0.0);
+            continue;
+        }
+        // Twice the signed areas: the ranges without their division, weighted by how well they are known.
+        let (area1, area2) = (-b.cross(direction).dot(&n), -c.cross(direction).dot(&n));
+        front += usize::from(area1 > 0.0 && area2 > 0.0);
+        behind += usize::from(area1 < 0.0 && area2 < 0.0);
+        signed += area1 + area2;
+        absolute += (area1.abs() / m.length1() + area2.abs() / m.length2()) / nn;
+        count += 2;
+    }
+    if count == 0 || absolute == 0.0 {
+        return (RelativePose::new(q_21, Vector3::zeros()), at_infinity);
+    }
+    let flip = behind > front || (behind == front && signed < 0.0);
+    let length = f64::from(count) / absolute;
+    let t_21 = direction * if flip { -length } else { length };
+    (RelativePose::new(q_21, t_21), at_infinity + if flip { behind } else { front })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{SMatrix, Vector4};
+
+    fn planted(t_21: Vector3<f64>) -> (RelativePose, Vec<Correspondence>) {
+        let truth = RelativePose::new(UnitQuaternion::new(Vector3::new(0.2, -0.4, 0.1)), t_21);
+        let points = [[0.3, 0.1, 2.0], [-0.5, 0.4, 3.0], [0.2, -0.6, 2.5], [-0.4, -0.3, 4.0], [0.7, 0.5, 3.5]];
+        let matches = points.map(|x1| {
+            let x2 = truth.q_21 * Vector3::from(x1) + truth.t_21;
+            Correspondence::from_image_points([x1[0] / x1[2], x1[1] / x1[2]], [x2.x / x2.z, x2.y / x2.z]).unwrap()
+        });
+        (truth, matches.into())
+    }
+
+    /// The null vector of (58), (59) by SVD, from the quaternion equations (32) as printed.
+    fn null_vector_of_59(q_21: &UnitQuaternion<f64>, matches: &[Correspondence]) -> [f64; 13] {
+        let mut b = SMatrix::<f64, 20, 13>::zeros();
+        let column = |q: nalgebra::Quaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
+        let q = q_21.quaternion();
+        for (i, m) in matches.iter().enumerate() {
+            let m1 = nalgebra::Quaternion::from_imag(m.bearing1() * m.length1());
+            let m2 = nalgebra::Quaternion::from_imag(m.bearing2() * m.length2());
+            for k in 0..3 {
+                let e = nalgebra::Quaternion::from_imag(Vector3::ith(k, 1.0));
+                b.fixed_view_mut::<4, 1>(4 * i, k).copy_from(&column(e * q));
+            }
+            b.fixed_view_mut::<4, 1>(4 * i, 3 + 2 * i).copy_from(&column(q * m1));
+            b.fixed_view_mut::<4, 1>(4 * i, 4 + 2 * i).copy_from(&column(-(m2 * q)));
+        }
+        let svd = b.svd(false, true);
+        let row = svd.v_t.unwrap().row(svd.singular_values.imin()).clone_owned();
+        std::array::from_fn(|k| row[k])
+    }
+
+    #[test]
+    fn closed_form_is_the_null_vector_of_equation_59() {
+        for parallax in [1.0, 1e-2, 1e-4] {
+            let (truth, matches) = planted(Vector3::new(0.5, -0.2, 0.3) * parallax);
+            let direction = translation_direction(&truth.q_21, &matches);
+            let (pose, in_front) = with_depths(truth.q_21, &direction, &matches);
+            assert_eq!(in_front, 5);
+            let null = null_vector_of_59(&truth.q_21, &matches);
+            let scale = null[3..].iter().map(|z| z.abs()).sum::<f64>() / 10.0 * null[3].signum();
+            // Rounding of the bearings over the parallax.
+            let tolerance = 1e-14 / parallax;
+            let mut depths = 0.0;
+            for (i, m) in matches.iter().enumerate() {
+                let (z1, z2) = pose.depths(m).unwrap();
+                assert!((z1 - null[3 + 2 * i] / scale).abs() < tolerance);
+                assert!((z2 - null[4 + 2 * i] / scale).abs() < tolerance);
+                depths += z1 + z2;
+            }
+            assert!((depths / 10.0 - 1.0).abs() < tolerance);
+            for k in 0..3 {
+                assert!((pose.t_21[k] - null[k] / scale).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn translation_is_proportional_to_the_parallax() {
+        let baseline = Vector3::new(0.5, -0.2, 0.3);
+        let (truth, matches) = planted(baseline * 1e-2);
+        let length = |truth: &RelativePose, matches: &[Correspondence]| {
+            with_depths(truth.q_21, &baseline.normalize(), matches).0.t_21.norm()
+        };
+        let reference = length(&truth, &matches) / 1e-2;
+        for parallax in [1e-4, 1e-6, 1e-8] {
+            let (truth, matches) = planted(baseline * parallax);
+            let ratio = length(&truth, &matches) / parallax / reference;
+            // Second order in the parallax, and rounding over the parallax.
+            assert!((ratio - 1.0).abs() < 1e-2 + 1e-15 / parallax, "{parallax:e}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn points_at_infinity_have_no_depth() {
+        let (truth, mut matches) = planted(Vector3::new(0.5, -0.2, 0.3));
+        let a = Vector3::new(0.1, 0.2, 1.0);
+        matches.push(Correspondence::from_bearings(a.into(), (truth.q_21 * a).into()).unwrap());
+        let (pose, in_front) = with_depths(truth.q_21, &truth.t_21.normalize(), &matches);
+        assert_eq!((in_front, pose.depths(&matches[5])), (6, None));
+        assert!(pose.t_21.norm() > 0.1);
+        let (pose, in_front) = with_depths(truth.q_21, &truth.t_21.normalize(), &matches[5..]);
+        assert_eq!((in_front, pose.t_21), (1, Vector3::zeros()));
+    }
+}
