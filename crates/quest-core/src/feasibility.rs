@@ -97,7 +97,8 @@ mod tests {
         // Camera 2 stands behind the points and looks back at camera 1.
         let half_turn = UnitQuaternion::new(Vector3::new(0.0, std::f64::consts::PI, 0.0));
         let pose = RelativePose::new(half_turn, Vector3::new(0.1, 0.0, 8.0));
-        let points = [[0.3, 0.1, 3.0], [-0.5, 0.4, 4.0], [0.2, -0.6, 3.5], [-0.4, -0.3, 5.0], [0.7, 0.5, 4.5]];
+        let points =
+            [[0.3, 0.1, 3.0], [-0.5, 0.4, 4.0], [0.2, -0.6, 3.5], [-0.4, -0.3, 5.0], [0.7, 0.5, 4.5]];
         let matches = points.map(|x1| {
             let x2 = pose.q_21 * Vector3::from(x1) + pose.t_21;
             Correspondence::from_bearings(x1, x2.into()).unwrap()

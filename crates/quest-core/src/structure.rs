@@ -80,10 +80,12 @@ mod tests {
 
     fn planted(t_21: Vector3<f64>) -> (RelativePose, Vec<Correspondence>) {
         let truth = RelativePose::new(UnitQuaternion::new(Vector3::new(0.2, -0.4, 0.1)), t_21);
-        let points = [[0.3, 0.1, 2.0], [-0.5, 0.4, 3.0], [0.2, -0.6, 2.5], [-0.4, -0.3, 4.0], [0.7, 0.5, 3.5]];
+        let points =
+            [[0.3, 0.1, 2.0], [-0.5, 0.4, 3.0], [0.2, -0.6, 2.5], [-0.4, -0.3, 4.0], [0.7, 0.5, 3.5]];
         let matches = points.map(|x1| {
             let x2 = truth.q_21 * Vector3::from(x1) + truth.t_21;
-            Correspondence::from_image_points([x1[0] / x1[2], x1[1] / x1[2]], [x2.x / x2.z, x2.y / x2.z]).unwrap()
+            Correspondence::from_image_points([x1[0] / x1[2], x1[1] / x1[2]], [x2.x / x2.z, x2.y / x2.z])
+                .unwrap()
         });
         (truth, matches.into())
     }

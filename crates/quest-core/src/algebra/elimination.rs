@@ -134,7 +134,11 @@ mod tests {
         for _ in 0..100 {
             let x: [Complex<f64>; 6] = std::array::from_fn(|k| {
                 let one = Complex::new(1.0, 0.0);
-                if k == 5 { one } else { Complex::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)) }
+                if k == 5 {
+                    one
+                } else {
+                    Complex::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0))
+                }
             });
             let mut a = [[Complex::new(0.0, 0.0); 6]; 6];
             for row in &mut a {
@@ -152,7 +156,8 @@ mod tests {
     #[test]
     fn solve_agrees_with_nalgebra_and_refuses_singular() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut a: [[f64; 5]; 5] = std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+        let mut a: [[f64; 5]; 5] =
+            std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
         let mut b: [f64; 5] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
         let matrix = SMatrix::<f64, 5, 5>::from_fn(|i, j| a[i][j]);
         let expected = matrix.lu().solve(&SVector::from(b)).unwrap();

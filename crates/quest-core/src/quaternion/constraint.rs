@@ -156,10 +156,9 @@ mod tests {
         let q = [0.7, -0.4, 1.2, 0.3];
         let norm2: f64 = q.iter().map(|x| x * x).sum();
         let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
-        let rotate = |v: Vector3<f64>| (quaternion * Quaternion::from_imag(v) * quaternion.conjugate()).imag();
-        let n = |m: &Correspondence| {
-            (m.bearing2() * m.length2()).cross(&rotate(m.bearing1() * m.length1()))
-        };
+        let rotate =
+            |v: Vector3<f64>| (quaternion * Quaternion::from_imag(v) * quaternion.conjugate()).imag();
+        let n = |m: &Correspondence| (m.bearing2() * m.length2()).cross(&rotate(m.bearing1() * m.length1()));
         let determinant =
             Matrix3::from_columns(&[n(&matches[0]), n(&matches[1]), n(&matches[2])]).determinant();
         let quartic = evaluate(&MONOMIALS, &constraint_matrix(&matches).unwrap()[0], q);

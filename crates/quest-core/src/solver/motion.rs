@@ -234,7 +234,8 @@ mod tests {
         let m = motion();
         let tangent = tangent_basis(&m.direction);
         let (b, a) = (Vector3::new(0.2, 0.5, 0.8).normalize(), Vector3::new(-0.1, 0.4, 0.9).normalize());
-        let at = |m: &Motion| Row::new(&b, &(m.q_21 * a), &m.direction, &tangent_basis(&m.direction)).residual;
+        let at =
+            |m: &Motion| Row::new(&b, &(m.q_21 * a), &m.direction, &tangent_basis(&m.direction)).residual;
         let row = Row::new(&b, &(m.q_21 * a), &m.direction, &tangent);
         let essential = |m: &Motion| m.direction.cross_matrix() * m.q_21.to_rotation_matrix().into_inner();
         let jacobian = essential_jacobian(&m, &tangent);

@@ -165,8 +165,7 @@ const TIMES_RATIO: [usize; 20] = {
 };
 
 /// The monomials in `q3, q4` of degree 3 and less, the constant last, by the exponents of both.
-const TAIL: [[u8; 2]; 10] =
-    [[3, 0], [2, 1], [1, 2], [0, 3], [2, 0], [1, 1], [0, 2], [1, 0], [0, 1], [0, 0]];
+const TAIL: [[u8; 2]; 10] = [[3, 0], [2, 1], [1, 2], [0, 3], [2, 0], [1, 1], [0, 2], [1, 0], [0, 1], [0, 0]];
 
 /// Which of [`TAIL`] each monomial of the basis contains.
 const TAIL_OF: [usize; 20] = {

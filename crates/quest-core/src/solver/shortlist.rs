@@ -123,7 +123,11 @@ pub(crate) fn rotation_only(q_21: UnitQuaternion<f64>, matches: &[Correspondence
 }
 
 /// The candidate of an exact pure rotation, where `q_21` explains the matches to rounding.
-pub(crate) fn pure_rotation(q_21: UnitQuaternion<f64>, matches: &[Correspondence], out: &mut Candidates) -> bool {
+pub(crate) fn pure_rotation(
+    q_21: UnitQuaternion<f64>,
+    matches: &[Correspondence],
+    out: &mut Candidates,
+) -> bool {
     let pose = RelativePose::new(q_21, nalgebra::Vector3::zeros());
     let residual = pose.residual(matches);
     if residual > NO_PARALLAX {
