@@ -1,8 +1,9 @@
 //! The rotation that best aligns two sets of bearings (Wahba's problem).
 
-use nalgebra::{Matrix3, Matrix4, SymmetricEigen, UnitQuaternion};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::Correspondence;
+use crate::algebra::symmetric::smallest_eigenvector_4;
 use crate::quaternion::{bilinear, from_wxyz};
 
 /// The rotation `R_21` that maximises `Σ b · R a` over the unit bearings `a` in view 1 and `b` in view 2.
@@ -13,13 +14,29 @@ use crate::quaternion::{bilinear, from_wxyz};
 #[must_use]
 pub fn best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
     let sum: Matrix3<f64> = matches.iter().map(|m| m.bearing2() * m.bearing1().transpose()).sum();
-    smallest_rotation(&bilinear(&sum))
+    let below = -(matches.len() as f64);
+    match smallest_eigenvector_4(&bilinear(&sum), below) {
+        Some(q) => polished(UnitQuaternion::new_normalize(from_wxyz(&q)), matches),
+        None => UnitQuaternion::identity(),
+    }
 }
 
-/// The unit quaternion that minimises `qᵀ M q`.
-fn smallest_rotation(m: &Matrix4<f64>) -> UnitQuaternion<f64> {
-    let eigen = SymmetricEigen::new(*m);
-    UnitQuaternion::new_normalize(from_wxyz(&eigen.eigenvectors.column(eigen.eigenvalues.imin()).into()))
+/// One Gauss–Newton step on `Σ |b − R a|²`. The eigenvector squares the condition of the problem, which shows where the
+/// bearings nearly lie in a line; the residuals do not.
+fn polished(q_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> UnitQuaternion<f64> {
+    let r_21 = q_21.to_rotation_matrix();
+    let (mut hessian, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+    for m in matches {
+        let c = r_21 * m.bearing1();
+        hessian += Matrix3::from_diagonal_element(c.norm_squared()) - c * c.transpose();
+        gradient += c.cross(&(m.bearing2() - c));
+    }
+    match hessian.try_inverse().map(|h| h * gradient) {
+        Some(step) if step.norm() < 1e-3 => {
+            UnitQuaternion::new_normalize((UnitQuaternion::new(step) * q_21).into_inner())
+        }
+        _ => q_21,
+    }
 }
 
 #[cfg(test)]

@@ -10,8 +10,9 @@
 //! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
 //! `|t|` is then the parallax (63), and goes to zero with it.
 
-use nalgebra::{Matrix3, SymmetricEigen, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::pose::PARALLEL;
 use crate::{Correspondence, RelativePose};
 
@@ -25,12 +26,7 @@ pub fn translation_direction(q_21: &UnitQuaternion<f64>, matches: &[Corresponden
         let n = m.bearing2().cross(&(r_21 * m.bearing1()));
         sum += n * n.transpose();
     }
-    let scale = sum.amax();
-    if scale == 0.0 {
-        return Vector3::z();
-    }
-    let eigen = SymmetricEigen::new(sum / scale);
-    eigen.eigenvectors.column(eigen.eigenvalues.imin()).normalize()
+    smallest_eigenvector_3(&sum).unwrap_or_else(Vector3::z)
 }
 
 /// The pose with rotation `q_21` and a translation along `direction` (a unit vector, of either sign): the sign

@@ -193,8 +193,9 @@ fn bulge_start<const N: usize>(
         let mut v =
             [(r * s - shift.w) / h[m + 1][m] + h[m][m + 1], h[m + 1][m + 1] - z - r - s, h[m + 2][m + 1]];
         let size = v[0].abs() + v[1].abs() + v[2].abs();
+        let over_size = 1.0 / size;
         for x in &mut v {
-            *x /= size;
+            *x *= over_size;
         }
         if m == first {
             return (m, v);
@@ -219,28 +220,24 @@ fn francis_sweep<const N: usize>(h: &mut [[f64; N]; N], first: usize, last: usiz
     }
     for k in start..last {
         let three = k + 1 < last;
-        let mut size = 1.0;
         if k != start {
             v = [h[k][k - 1], h[k + 1][k - 1], if three { h[k + 2][k - 1] } else { 0.0 }];
-            size = v[0].abs() + v[1].abs() + v[2].abs();
-            if size == 0.0 {
-                continue;
-            }
-            v = v.map(|x| x / size);
         }
+        // The matrix is balanced, so the squares stay in range.
         let s = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt().copysign(v[0]);
         if s == 0.0 {
             continue;
         }
         if k != start {
-            h[k][k - 1] = -s * size;
+            h[k][k - 1] = -s;
         } else if first != start {
             h[k][k - 1] = -h[k][k - 1];
         }
         // The reflection I − u wᵀ with u = (v + s e1) / s and w = u normalised to w_0 = 1.
         let p = v[0] + s;
-        let u = [p / s, v[1] / s, v[2] / s];
-        let w = [1.0, v[1] / p, v[2] / p];
+        let (over_s, over_p) = (1.0 / s, 1.0 / p);
+        let u = [p * over_s, v[1] * over_s, v[2] * over_s];
+        let w = [1.0, v[1] * over_p, v[2] * over_p];
         reflect_rows(h, k, last, three, u, w);
         reflect_columns(h, k, first, last, three, u, w);
     }
@@ -256,22 +253,23 @@ fn reflect_rows<const N: usize>(
     u: [f64; 3],
     w: [f64; 3],
 ) {
-    let (upper, lower) = h.split_at_mut(k + 1);
-    let row0 = &mut upper[k];
+    // Slices of one length, so that the compiler drops the bounds checks and vectorises.
+    let columns = k..=last;
     if three {
-        let (one, two) = lower.split_at_mut(1);
-        for j in k..=last {
-            let sum = row0[j] + w[1] * one[0][j] + w[2] * two[0][j];
-            row0[j] -= sum * u[0];
-            one[0][j] -= sum * u[1];
-            two[0][j] -= sum * u[2];
+        let [row0, row1, row2, ..] = &mut h[k..] else { return };
+        let row0 = row0[columns.clone()].iter_mut();
+        for ((x, y), z) in row0.zip(&mut row1[columns.clone()]).zip(&mut row2[columns]) {
+            let sum = *x + w[1] * *y + w[2] * *z;
+            *x -= sum * u[0];
+            *y -= sum * u[1];
+            *z -= sum * u[2];
         }
     } else {
-        let row1 = &mut lower[0];
-        for j in k..=last {
-            let sum = row0[j] + w[1] * row1[j];
-            row0[j] -= sum * u[0];
-            row1[j] -= sum * u[1];
+        let [row0, row1, ..] = &mut h[k..] else { return };
+        for (x, y) in row0[columns.clone()].iter_mut().zip(&mut row1[columns]) {
+            let sum = *x + w[1] * *y;
+            *x -= sum * u[0];
+            *y -= sum * u[1];
         }
     }
 }
@@ -287,17 +285,21 @@ fn reflect_columns<const N: usize>(
     u: [f64; 3],
     w: [f64; 3],
 ) {
-    let bottom = if last < k + 3 { last } else { k + 3 };
-    for row in &mut h[first..=bottom] {
-        if three {
-            let sum = u[0] * row[k] + u[1] * row[k + 1] + u[2] * row[k + 2];
-            row[k] -= sum;
-            row[k + 1] -= sum * w[1];
-            row[k + 2] -= sum * w[2];
-        } else {
-            let sum = u[0] * row[k] + u[1] * row[k + 1];
-            row[k] -= sum;
-            row[k + 1] -= sum * w[1];
+    let rows = &mut h[first..=last.min(k + 3)];
+    if three {
+        for row in rows {
+            let Some([x, y, z]) = row[k..].first_chunk_mut::<3>() else { return };
+            let sum = u[0] * *x + u[1] * *y + u[2] * *z;
+            *x -= sum;
+            *y -= sum * w[1];
+            *z -= sum * w[2];
+        }
+    } else {
+        for row in rows {
+            let Some([x, y]) = row[k..].first_chunk_mut::<2>() else { return };
+            let sum = u[0] * *x + u[1] * *y;
+            *x -= sum;
+            *y -= sum * w[1];
         }
     }
 }

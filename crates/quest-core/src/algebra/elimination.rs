@@ -74,7 +74,7 @@ pub(crate) fn null_vector<T: ComplexField<RealField = f64> + Copy, const N: usiz
         }
         x[k] = -sum / a[k][k];
     }
-    x.iter().all(|v| v.is_finite()).then_some(x)
+    x.iter().all(ComplexField::is_finite).then_some(x)
 }
 
 /// Solves `a x = b` in place of `b`, with partial pivoting. `false` where `a` is singular.
@@ -102,7 +102,7 @@ pub(crate) fn solve<const N: usize>(a: &mut [[f64; N]; N], b: &mut [f64; N]) -> 
         }
         b[k] /= a[k][k];
     }
-    b.iter().all(|v| v.is_finite())
+    b.iter().all(|v| f64::is_finite(*v))
 }
 
 #[cfg(test)]

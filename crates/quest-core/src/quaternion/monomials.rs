@@ -44,19 +44,20 @@ pub(crate) const SQUARE: [[usize; 4]; 4] = {
 const fn homogeneous<const N: usize>(degree: u8) -> [[u8; 4]; N] {
     let mut list = [[0; 4]; N];
     let mut n = 0;
-    let mut a = degree as i8;
-    while a >= 0 {
-        let mut b = degree as i8 - a;
-        while b >= 0 {
-            let mut c = degree as i8 - a - b;
-            while c >= 0 {
-                list[n] = [a as u8, b as u8, c as u8, degree - (a + b + c) as u8];
+    // What is left for the variables after the first, after the second, and for the last alone.
+    let mut after_1 = 0;
+    while after_1 <= degree {
+        let mut after_2 = 0;
+        while after_2 <= after_1 {
+            let mut last = 0;
+            while last <= after_2 {
+                list[n] = [degree - after_1, after_1 - after_2, after_2 - last, last];
                 n += 1;
-                c -= 1;
+                last += 1;
             }
-            b -= 1;
+            after_2 += 1;
         }
-        a -= 1;
+        after_1 += 1;
     }
     assert!(n == N);
     list

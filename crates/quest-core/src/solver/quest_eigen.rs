@@ -26,7 +26,7 @@
 use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 
 use super::constraints::{Gram, of_five};
-use super::motion::{Motion, Outcome};
+use super::motion::Motion;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
 use super::{Kinds, PoseSolver};
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
@@ -220,7 +220,7 @@ impl Spectrum {
         let leaving = (0..20).filter(|&k| TIMES_RATIO[k] < 15);
         for (row, k) in a.iter_mut().zip(leaving) {
             for j in 0..20 {
-                row[TAIL_OF[j]] += powers[usize::from(BASIS[j][1])] * T::from_real(self.action[k][j]);
+                row[TAIL_OF[j]] += powers[usize::from(BASIS[j][1])].scale(self.action[k][j]);
             }
             row[TAIL_OF[k]] -= value * powers[usize::from(BASIS[k][1])];
         }
@@ -242,7 +242,7 @@ impl Spectrum {
             return None;
         };
         let q = g.inverse() * UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-        q.coords.iter().all(|c| c.is_finite()).then_some((kind, q))
+        q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
     }
 
     /// Adds the solution of every eigenvalue. Whether all of the real ones were found.
@@ -253,21 +253,42 @@ impl Spectrum {
         shortlist: &mut Shortlist,
     ) -> bool {
         let mut complete = true;
-        for value in self.values {
+        let mut values = self.values;
+        for k in 0..values.len() {
+            let value = values[k];
+            if value.im < 0.0 || value.re.is_nan() {
+                continue;
+            }
             let Some((kind, q_21)) = self.rotation(value, g) else {
-                complete &= value.im < 0.0;
+                complete = false;
                 continue;
             };
             let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
-            if kind == CandidateKind::Exact {
-                complete &= shortlist.push_solution(motion, matches) == Outcome::Converged;
-            } else {
+            if kind == CandidateKind::FromComplex {
                 shortlist.push(kind, motion);
+                continue;
+            }
+            let Some(solution) = shortlist.push_solution(motion, matches) else {
+                complete = false;
+                continue;
+            };
+            // The twisted partner has been found with it.
+            let twin = (g * solution.twisted().q_21).coords;
+            if let Some(known) = nearest_real(&values[k + 1..], twin.x / twin.w) {
+                values[k + 1 + known].re = f64::NAN;
             }
         }
         let real = self.values.iter().filter(|value| value.im == 0.0).count();
         complete && shortlist.count(CandidateKind::Exact) >= real
     }
+}
+
+/// The real eigenvalue that `ratio` is, as far as eigenvalues are precise.
+fn nearest_real(values: &[Complex<f64>], ratio: f64) -> Option<usize> {
+    let distance = |k: &usize| (values[*k].re - ratio).abs();
+    let real = (0..values.len()).filter(|&k| values[k].im == 0.0 && !values[k].re.is_nan());
+    let nearest = real.min_by(|i, j| distance(i).total_cmp(&distance(j)))?;
+    (distance(&nearest) < 1e-6 * (1.0 + ratio.abs())).then_some(nearest)
 }
 
 /// The real part of a complex quaternion, scaled by the phase that leaves the most of it.

@@ -63,18 +63,21 @@ impl Shortlist {
     }
 
     /// Adds the solution of five constraints near `motion`, and the twisted one beside it; a start from which
-    /// Newton's iteration does not converge is taken as it is, for the real part of a complex solution.
-    pub(crate) fn push_solution(&mut self, mut motion: Motion, matches: &[Correspondence; 5]) -> Outcome {
-        let start = motion;
-        let outcome = motion.solve_five(matches, 10);
-        match outcome {
+    /// Newton's iteration does not converge is kept as it is, and reported as `None`: it stands for a
+    /// complex solution that happens to be nearly real.
+    pub(crate) fn push_solution(&mut self, start: Motion, matches: &[Correspondence; 5]) -> Option<Motion> {
+        let mut motion = start;
+        match motion.solve_five(matches, 10) {
             Outcome::Converged => {
                 self.push(CandidateKind::Exact, motion);
                 self.push(CandidateKind::Exact, motion.twisted());
+                Some(motion)
             }
-            Outcome::Stalled => self.push(CandidateKind::FromComplex, start),
+            Outcome::Stalled => {
+                self.push(CandidateKind::FromComplex, start);
+                None
+            }
         }
-        outcome
     }
 
     /// The local minima of the squared Sampson errors over all matches that these motions lead to.

@@ -1,0 +1,96 @@
+//! The null space of a wide matrix by Householder reflections.
+
+/// An orthonormal basis of the vectors orthogonal to the `R` rows of `a`, and the smallest pivot over the largest: how
+/// far the rows are from dependent.
+///
+/// The longest remaining row is reflected first. `C = R + K`; `a` is overwritten.
+pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
+    a: &mut [[f64; C]; R],
+) -> ([[f64; C]; K], f64) {
+    const { assert!(R + K == C) }
+    let mut inverse = [0.0; R];
+    let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
+    for k in 0..R {
+        let (mut longest, mut square) = (k, -1.0);
+        for i in k..R {
+            let s: f64 = a[i][k..].iter().map(|x| x * x).sum();
+            if s > square {
+                (longest, square) = (i, s);
+            }
+        }
+        a.swap(k, longest);
+        let length = square.max(0.0).sqrt();
+        smallest = smallest.min(length);
+        largest = largest.max(length);
+        // The row becomes the reflection's vector v, with I − v vᵀ · inverse.
+        let (head, tail) = a.split_at_mut(k + 1);
+        let v = &mut head[k];
+        let image = -length.copysign(v[k]);
+        let first = v[k] - image;
+        v[k] = first;
+        inverse[k] = if length > 0.0 { -1.0 / (image * first) } else { 0.0 };
+        for row in tail {
+            reflect(row, v, inverse[k], k);
+        }
+    }
+    let mut basis = [[0.0; C]; K];
+    for (m, e) in basis.iter_mut().enumerate() {
+        e[R + m] = 1.0;
+        for k in (0..R).rev() {
+            reflect(e, &a[k], inverse[k], k);
+        }
+    }
+    (basis, if largest > 0.0 { smallest / largest } else { 0.0 })
+}
+
+/// Applies `I − v vᵀ · inverse`, where `v` starts at entry `k`.
+#[inline]
+fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64, k: usize) {
+    let mut dot = 0.0;
+    for j in k..C {
+        dot += v[j] * x[j];
+    }
+    dot *= inverse;
+    for j in k..C {
+        x[j] -= dot * v[j];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn dot(x: &[f64; 9], y: &[f64; 9]) -> f64 {
+        x.iter().zip(y).map(|(a, b)| a * b).sum()
+    }
+
+    #[test]
+    fn basis_is_orthonormal_and_orthogonal_to_the_rows() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..100 {
+            let a: [[f64; 9]; 5] =
+                std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+            let (basis, pivot) = null_space::<5, 9, 4>(&mut a.clone());
+            assert!(pivot > 1e-3);
+            for (i, x) in basis.iter().enumerate() {
+                assert!(a.iter().all(|row| dot(row, x).abs() < 1e-14));
+                for (j, y) in basis.iter().enumerate() {
+                    assert!((dot(x, y) - f64::from(u8::from(i == j))).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn dependent_rows_have_a_small_pivot() {
+        let mut a = [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]; 5];
+        for (k, row) in a.iter_mut().enumerate().take(4) {
+            row[k] += 1.0;
+        }
+        a[4] = std::array::from_fn(|j| a[0][j] + a[1][j] - 2.0 * a[2][j]);
+        assert!(null_space::<5, 9, 4>(&mut a).1 < 1e-15);
+        assert_eq!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1, 0.0);
+    }
+}

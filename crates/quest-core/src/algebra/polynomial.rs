@@ -1,0 +1,382 @@
+//! The roots of a real polynomial of small fixed degree.
+//!
+//! Real roots by Sturm's theorem: the sign changes of a chain of polynomials count the roots in an interval, bisection
+//! isolates them, and a safeguarded Newton iteration refines each. Complex roots by Laguerre's method on what is left.
+//!
+//! Coefficients stand from the constant up; a polynomial of degree `D` has `N = D + 1` of them.
+
+use nalgebra::Complex;
+
+/// Where bisection gives up on telling two roots apart, in halvings of an interval.
+const MAX_DEPTH: u32 = 45;
+
+/// The real roots that were found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RealRoots<const N: usize> {
+    values: [f64; N],
+    len: usize,
+    /// Whether all of them were told apart and refined.
+    pub(crate) certain: bool,
+}
+
+impl<const N: usize> RealRoots<N> {
+    pub(crate) fn as_slice(&self) -> &[f64] {
+        &self.values[..self.len]
+    }
+
+    fn push(&mut self, root: f64) {
+        if self.len < N {
+            self.values[self.len] = root;
+            self.len += 1;
+        }
+    }
+}
+
+/// All real roots of `p`, in increasing order.
+pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {
+    let mut roots = RealRoots { values: [0.0; N], len: 0, certain: true };
+    let Some(chain) = Chain::new(p) else {
+        roots.certain = false;
+        return roots;
+    };
+    let at = |x: f64| End { x, changes: chain.sign_changes(x) };
+    let (minus_one, zero, one) = (at(-1.0), at(0.0), at(1.0));
+    let below = chain.bound(-1.0, minus_one.changes);
+    let above = chain.bound(1.0, one.changes);
+    if let Some(below) = below {
+        chain.isolate(below, minus_one, MAX_DEPTH, &mut roots);
+    }
+    chain.isolate(minus_one, zero, MAX_DEPTH, &mut roots);
+    chain.isolate(zero, one, MAX_DEPTH, &mut roots);
+    if let Some(above) = above {
+        chain.isolate(one, above, MAX_DEPTH, &mut roots);
+    }
+    roots
+}
+
+/// An end of an interval with the sign changes of the chain there.
+#[derive(Clone, Copy)]
+struct End {
+    x: f64,
+    changes: u32,
+}
+
+/// A Sturm chain `f_0 = p, f_1 ∝ p', f_{k+2} ∝ −(f_k mod f_{k+1})`, kept as the recurrence
+/// `f_k = (slope x + offset) f_{k+1} − weight f_{k+2}` so that an evaluation costs two products a member.
+struct Chain<const N: usize> {
+    /// Scaled to a leading coefficient of one.
+    p: [f64; N],
+    /// `(offset, slope, weight)`; the last two entries are not used.
+    links: [[f64; 3]; N],
+    /// `f_{D−1}` and the sign of the constant `f_D`.
+    last_linear: [f64; 2],
+    last: f64,
+}
+
+impl<const N: usize> Chain<N> {
+    /// `None` where the chain breaks off: a leading coefficient that vanishes, a root that is exactly double.
+    fn new(p: &[f64; N]) -> Option<Self> {
+        let degree = N - 1;
+        let scale = 1.0 / p[degree];
+        if !scale.is_finite() {
+            return None;
+        }
+        let p = p.map(|c| c * scale);
+        let (mut f, mut g) = (p, [0.0; N]);
+        for i in 1..N {
+            g[i - 1] = f[i] * i as f64 / degree as f64;
+        }
+        let mut links = [[0.0; 3]; N];
+        // The leading coefficients of all members are ±1, so that divisions are products.
+        let mut sign = 1.0;
+        for (k, link) in links.iter_mut().enumerate().take(degree - 1) {
+            let d = degree - k;
+            let slope = f[d] * sign;
+            let offset = (f[d - 1] - slope * g[d - 2]) * sign;
+            let mut rest = [0.0; N];
+            rest[0] = offset * g[0] - f[0];
+            for i in 1..d - 1 {
+                rest[i] = offset * g[i] + slope * g[i - 1] - f[i];
+            }
+            let weight = rest[d - 2].abs();
+            let inverse = 1.0 / weight;
+            if !inverse.is_finite() {
+                return None;
+            }
+            for c in &mut rest[..d - 1] {
+                *c *= inverse;
+            }
+            *link = [offset, slope, weight];
+            sign = 1.0_f64.copysign(rest[d - 2]);
+            (f, g) = (g, rest);
+        }
+        let finite = p.iter().chain(&f).chain(&g).all(|c| c.is_finite());
+        finite.then_some(Self { p, links, last_linear: [f[0], f[1]], last: g[0] })
+    }
+
+    /// How often the sign changes along the chain at `x`.
+    fn sign_changes(&self, x: f64) -> u32 {
+        let (mut upper, mut lower) = (self.last_linear[1] * x + self.last_linear[0], self.last);
+        let mut changes = u32::from((upper < 0.0) != (lower < 0.0));
+        for [offset, slope, weight] in self.links[..N - 2].iter().rev() {
+            let next = (slope * x + offset) * upper - weight * lower;
+            changes += u32::from((next < 0.0) != (upper < 0.0));
+            (upper, lower) = (next, upper);
+        }
+        changes
+    }
+
+    /// A point beyond all roots on the side of `unit`, with `changes` at `unit`; `None` where there are none.
+    fn bound(&self, unit: f64, changes: u32) -> Option<End> {
+        // At ±∞ the leading terms decide: x, and the slopes of the recurrence.
+        let mut at_infinity = u32::from((self.last_linear[1] * unit < 0.0) != (self.last < 0.0));
+        for [_, slope, _] in &self.links[..N - 2] {
+            at_infinity += u32::from(slope * unit < 0.0);
+        }
+        let mut x = unit;
+        let mut at_x = changes;
+        while at_x != at_infinity {
+            x *= 4.0;
+            at_x = self.sign_changes(x);
+            // A root this far out is one at infinity, of a polynomial of lower degree.
+            if x.abs() > 1e12 {
+                break;
+            }
+        }
+        (at_x != changes).then_some(End { x, changes: at_x })
+    }
+
+    fn isolate(&self, from: End, to: End, depth: u32, roots: &mut RealRoots<N>) {
+        let count = from.changes.saturating_sub(to.changes);
+        match count {
+            0 => {}
+            1 => roots.push(self.refine(from.x, to.x)),
+            _ if depth == 0 => {
+                roots.certain = false;
+                for _ in 0..count {
+                    roots.push(0.5 * (from.x + to.x));
+                }
+            }
+            _ => {
+                let x = 0.5 * (from.x + to.x);
+                let middle = End { x, changes: self.sign_changes(x) };
+                self.isolate(from, middle, depth - 1, roots);
+                self.isolate(middle, to, depth - 1, roots);
+            }
+        }
+    }
+
+    /// The one root in an interval: Newton's iteration, bisection where it would leave the bracket.
+    fn refine(&self, mut low: f64, mut high: f64) -> f64 {
+        let negative_below = value_and_slope(&self.p, low).0 < 0.0;
+        let mut x = 0.5 * (low + high);
+        for _ in 0..80 {
+            let (value, slope) = value_and_slope(&self.p, x);
+            if (value < 0.0) == negative_below {
+                low = x;
+            } else {
+                high = x;
+            }
+            let newton = x - value / slope;
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            let moved = (next - x).abs();
+            x = next;
+            // Convergence is quadratic: a step of half the digits leaves none.
+            if moved <= 1e-9 * (1e-3 + x.abs()) {
+                let (value, slope) = value_and_slope(&self.p, x);
+                let last = x - value / slope;
+                return if last.is_finite() && (last - x).abs() <= moved { last } else { x };
+            }
+        }
+        x
+    }
+}
+
+fn value_and_slope<const N: usize>(p: &[f64; N], x: f64) -> (f64, f64) {
+    let (mut value, mut slope) = (p[N - 1], 0.0);
+    for c in p[..N - 1].iter().rev() {
+        slope = slope * x + value;
+        value = value * x + c;
+    }
+    (value, slope)
+}
+
+/// One of each pair of complex roots of `p`, that with the positive imaginary part, given all its real roots.
+///
+/// Returns how many stand in `out`.
+pub(crate) fn complex_roots<const N: usize>(
+    p: &[f64; N],
+    real: &[f64],
+    out: &mut [Complex<f64>; N],
+) -> usize {
+    let mut rest = *p;
+    let mut degree = N - 1;
+    for &root in real {
+        divide_linear(&mut rest, degree, root);
+        degree -= 1;
+    }
+    let mut found = 0;
+    while degree >= 2 {
+        let coefficients = &rest[..=degree];
+        let root = if degree == 2 { quadratic_root(coefficients) } else { laguerre(coefficients) };
+        let Some(root) = root else { break };
+        divide_quadratic(&mut rest, degree, 2.0 * root.re, root.norm_sqr());
+        degree -= 2;
+        let polished = newton_step(p, newton_step(p, root));
+        let polished = if polished.re.is_finite() && polished.im.is_finite() { polished } else { root };
+        if polished.im != 0.0 {
+            out[found] = Complex::new(polished.re, polished.im.abs());
+            found += 1;
+        }
+    }
+    found
+}
+
+/// Divides by `x − root`, from the end where rounding does not grow.
+fn divide_linear<const N: usize>(p: &mut [f64; N], degree: usize, root: f64) {
+    if root.abs() <= 1.0 {
+        let mut carry = p[degree];
+        for c in p[..degree].iter_mut().rev() {
+            (*c, carry) = (carry, *c + root * carry);
+        }
+    } else {
+        let mut carry = 0.0;
+        for c in &mut p[..degree] {
+            carry = (carry - *c) / root;
+            *c = carry;
+        }
+    }
+}
+
+/// Divides by `x² − sum x + product`, forwards.
+fn divide_quadratic<const N: usize>(p: &mut [f64; N], degree: usize, sum: f64, product: f64) {
+    let (mut last, mut before) = (0.0, 0.0);
+    for k in (2..=degree).rev() {
+        let quotient = p[k] + sum * last - product * before;
+        (last, before) = (quotient, last);
+        p[k] = quotient;
+    }
+    p.copy_within(2..=degree, 0);
+}
+
+/// The root with positive imaginary part of a quadratic; a double real root where rounding left a real pair.
+fn quadratic_root(p: &[f64]) -> Option<Complex<f64>> {
+    let half = -0.5 * p[1] / p[2];
+    let square = p[0] / p[2] - half * half;
+    let root = Complex::new(half, square.max(0.0).sqrt());
+    (root.re.is_finite() && root.im.is_finite()).then_some(root)
+}
+
+/// Laguerre's iteration to a root of a polynomial that has no real ones.
+fn laguerre(p: &[f64]) -> Option<Complex<f64>> {
+    let degree = (p.len() - 1) as f64;
+    let mut z = Complex::new(0.0, 1.0);
+    for _ in 0..40 {
+        let (mut f, mut d, mut h) = (Complex::from(p[p.len() - 1]), Complex::from(0.0), Complex::from(0.0));
+        for c in p[..p.len() - 1].iter().rev() {
+            h = h * z + d;
+            d = d * z + f;
+            f = f * z + c;
+        }
+        if f.norm_sqr() == 0.0 {
+            return Some(z);
+        }
+        let g = d / f;
+        let g2 = g * g;
+        let curvature = g2 - 2.0 * h / f;
+        let root = ((degree * curvature - g2) * (degree - 1.0)).sqrt();
+        let (plus, minus) = (g + root, g - root);
+        let denominator = if plus.norm_sqr() > minus.norm_sqr() { plus } else { minus };
+        let step = degree / denominator;
+        if !(step.re.is_finite() && step.im.is_finite()) {
+            return None;
+        }
+        z -= step;
+        // Cubic convergence, and Newton's steps on the whole polynomial follow.
+        if step.norm_sqr() <= 1e-14 * z.norm_sqr() {
+            return Some(z);
+        }
+    }
+    None
+}
+
+fn newton_step<const N: usize>(p: &[f64; N], z: Complex<f64>) -> Complex<f64> {
+    let (mut value, mut slope) = (Complex::from(p[N - 1]), Complex::from(0.0));
+    for c in p[..N - 1].iter().rev() {
+        slope = slope * z + value;
+        value = value * z + c;
+    }
+    z - value / slope
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The polynomial of degree 10 with these roots, the complex ones with their conjugates.
+    fn planted(real: &[f64], complex: &[Complex<f64>]) -> [f64; 11] {
+        let mut p = [0.0; 11];
+        p[0] = 1.0;
+        let mut degree = 0;
+        let factors = complex.iter().map(|z| [z.norm_sqr(), -2.0 * z.re, 1.0]);
+        for factor in real.iter().map(|r| [-r, 1.0, 0.0]).chain(factors) {
+            let mut product = [0.0; 11];
+            for i in 0..=degree {
+                for (j, f) in factor.iter().enumerate().filter(|(j, _)| i + j < 11) {
+                    product[i + j] += p[i] * f;
+                }
+            }
+            degree += if factor[2] == 0.0 { 1 } else { 2 };
+            p = product;
+        }
+        assert_eq!(degree, 10);
+        p
+    }
+
+    #[test]
+    fn planted_roots_are_found() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        for round in 0..2000 {
+            let pairs = round % 6;
+            let mut real: Vec<f64> = (0..10 - 2 * pairs)
+                .map(|_| rng.random_range(-1.0..1.0_f64) * 10_f64.powf(rng.random_range(-1.0..1.0)))
+                .collect();
+            real.sort_by(f64::total_cmp);
+            let complex: Vec<_> = (0..pairs)
+                .map(|_| Complex::new(rng.random_range(-2.0..2.0), rng.random_range(0.05..2.0)))
+                .collect();
+            let p = planted(&real, &complex);
+            // Roots closer than this are lost in the rounding of the coefficients.
+            if real.windows(2).any(|w| w[1] - w[0] < 1e-2 * w[1].abs().max(0.1)) {
+                continue;
+            }
+            let found = real_roots(&p);
+            assert_eq!(found.as_slice().len(), real.len(), "{real:?} {complex:?}");
+            for (x, y) in found.as_slice().iter().zip(&real) {
+                assert!((x - y).abs() < 1e-6 * (1.0 + y.abs()), "{x} {y}");
+            }
+            let mut out = [Complex::from(0.0); 11];
+            let n = complex_roots(&p, found.as_slice(), &mut out);
+            assert_eq!(n, pairs);
+            for z in &complex {
+                let nearest = out[..n].iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 1e-4, "{z} is off by {nearest:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn roots_without_end() {
+        // A leading coefficient of zero, an exact double root, NaN: no panic, and not certain.
+        let mut p =
+            planted(&[-2.0, -1.0, 0.5, 3.0], &[Complex::new(0.0, 1.0), Complex::new(1.0, 2.0), Complex::i()]);
+        assert!(real_roots(&p).as_slice().len() >= 4);
+        p[10] = 0.0;
+        assert!(!real_roots(&p).certain);
+        p[3] = f64::NAN;
+        assert!(!real_roots(&p).certain);
+        assert!(!real_roots(&[0.0; 11]).certain);
+    }
+}

@@ -1,0 +1,162 @@
+//! The smallest eigenvalue of a symmetric 3 × 3 or 4 × 4 matrix, and its vector.
+//!
+//! All roots of the characteristic polynomial are real, so that Newton's iteration from below the smallest one rises
+//! to it monotonically. The eigenvector is the longest column of the adjugate of the shifted matrix.
+
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+
+/// Enough for a double root, where the convergence is linear.
+const MAX_STEPS: usize = 60;
+
+/// The root that Newton's iteration reaches from `below`, for `f(x) = (value, derivative)`.
+fn smallest_root(below: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut x = below;
+    for _ in 0..MAX_STEPS {
+        let (value, slope) = f(x);
+        let step = value / slope;
+        // At the root rounding turns the step round, or leaves no slope.
+        if !step.is_finite() || step >= 0.0 {
+            break;
+        }
+        x -= step;
+        if -step <= f64::EPSILON * x.abs() {
+            break;
+        }
+    }
+    x
+}
+
+/// The unit eigenvector of a positive semidefinite matrix with the smallest eigenvalue.
+///
+/// One of its eigenvectors where the eigenvalue is multiple; `None` where no direction is left of the matrix.
+pub(crate) fn smallest_eigenvector_3(m: &Matrix3<f64>) -> Option<Vector3<f64>> {
+    let scale = m.trace();
+    if scale <= 0.0 || !scale.is_finite() {
+        return None;
+    }
+    let m = m / scale;
+    let (x, y, z) = (m[(0, 0)], m[(1, 1)], m[(2, 2)]);
+    let (xy, xz, yz) = (m[(0, 1)], m[(0, 2)], m[(1, 2)]);
+    // λ³ − λ² + second λ − determinant, the trace being one.
+    let second = x * y + x * z + y * z - xy * xy - xz * xz - yz * yz;
+    let determinant = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz);
+    let value =
+        smallest_root(0.0, |l| (((l - 1.0) * l + second) * l - determinant, (3.0 * l - 2.0) * l + second));
+    let rows =
+        [Vector3::new(x - value, xy, xz), Vector3::new(xy, y - value, yz), Vector3::new(xz, yz, z - value)];
+    let columns = [rows[1].cross(&rows[2]), rows[2].cross(&rows[0]), rows[0].cross(&rows[1])];
+    let longest = longest(&columns.map(|c| c.norm_squared()))?;
+    Some(columns[longest].normalize())
+}
+
+/// The unit eigenvector of a symmetric matrix without trace whose eigenvalues are at least `below`, for its
+/// smallest one; otherwise as [`smallest_eigenvector_3`].
+pub(crate) fn smallest_eigenvector_4(m: &Matrix4<f64>, below: f64) -> Option<Vector4<f64>> {
+    let m = m / -below;
+    // λ⁴ + b λ² + c λ + d, by the traces of powers.
+    let square = m * m;
+    let b = -0.5 * square.trace();
+    let c = -square.dot(&m) / 3.0;
+    let d = 0.5 * b * b - 0.25 * square.norm_squared();
+    let value = smallest_root(-1.0, |l| (((l * l + b) * l + c) * l + d, (4.0 * l * l + 2.0 * b) * l + c));
+    let shifted = m - Matrix4::from_diagonal_element(value);
+    let adjugate = adjugate(&shifted);
+    let longest = longest(&std::array::from_fn::<_, 4, _>(|k| adjugate.column(k).norm_squared()))?;
+    Some(adjugate.column(longest).normalize())
+}
+
+/// The index of the largest entry, where it is positive.
+fn longest<const N: usize>(squares: &[f64; N]) -> Option<usize> {
+    let largest = (0..N).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
+    (squares[largest] > 0.0).then_some(largest)
+}
+
+/// The adjugate of a symmetric 4 × 4 matrix by its 2 × 2 minors.
+fn adjugate(m: &Matrix4<f64>) -> Matrix4<f64> {
+    let minor = |r: usize, s: usize, i: usize, j: usize| m[(r, i)] * m[(s, j)] - m[(r, j)] * m[(s, i)];
+    let upper = [
+        minor(0, 1, 0, 1),
+        minor(0, 1, 0, 2),
+        minor(0, 1, 0, 3),
+        minor(0, 1, 1, 2),
+        minor(0, 1, 1, 3),
+        minor(0, 1, 2, 3),
+    ];
+    let lower = [
+        minor(2, 3, 0, 1),
+        minor(2, 3, 0, 2),
+        minor(2, 3, 0, 3),
+        minor(2, 3, 1, 2),
+        minor(2, 3, 1, 3),
+        minor(2, 3, 2, 3),
+    ];
+    let e = |i: usize, j: usize| m[(i, j)];
+    let mut a = Matrix4::zeros();
+    a[(0, 0)] = e(1, 1) * lower[5] - e(1, 2) * lower[4] + e(1, 3) * lower[3];
+    a[(1, 0)] = -(e(1, 0) * lower[5] - e(1, 2) * lower[2] + e(1, 3) * lower[1]);
+    a[(2, 0)] = e(1, 0) * lower[4] - e(1, 1) * lower[2] + e(1, 3) * lower[0];
+    a[(3, 0)] = -(e(1, 0) * lower[3] - e(1, 1) * lower[1] + e(1, 2) * lower[0]);
+    a[(1, 1)] = e(0, 0) * lower[5] - e(0, 2) * lower[2] + e(0, 3) * lower[1];
+    a[(2, 1)] = -(e(0, 0) * lower[4] - e(0, 1) * lower[2] + e(0, 3) * lower[0]);
+    a[(3, 1)] = e(0, 0) * lower[3] - e(0, 1) * lower[1] + e(0, 2) * lower[0];
+    a[(2, 2)] = e(3, 0) * upper[4] - e(3, 1) * upper[2] + e(3, 3) * upper[0];
+    a[(3, 2)] = -(e(3, 0) * upper[3] - e(3, 1) * upper[1] + e(3, 2) * upper[0]);
+    a[(3, 3)] = e(2, 0) * upper[3] - e(2, 1) * upper[1] + e(2, 2) * upper[0];
+    for i in 0..4 {
+        for j in i + 1..4 {
+            a[(i, j)] = a[(j, i)];
+        }
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SymmetricEigen;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn adjugate_times_matrix_is_the_determinant() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let m = Matrix4::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let m = m + m.transpose();
+        let expected = Matrix4::from_diagonal_element(m.determinant());
+        assert!((adjugate(&m) * m - expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn eigenvectors_agree_with_nalgebra() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for _ in 0..1000 {
+            let m = Matrix4::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let mut m = m + m.transpose();
+            m -= Matrix4::from_diagonal_element(m.trace() / 4.0);
+            let eigen = SymmetricEigen::new(m);
+            let mut values: Vec<_> = eigen.eigenvalues.iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let expected = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            let found = smallest_eigenvector_4(&m, -m.norm()).unwrap();
+            // The adjugate shrinks with the gap to the next eigenvalue, and the root loses digits to it as well.
+            let gap = (values[1] - values[0]) / m.norm();
+            assert!(1.0 - found.dot(&expected).abs() < 1e-13 / gap.powi(4), "gap {gap:e}");
+
+            let b = Matrix3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let m = b * b.transpose();
+            let eigen = SymmetricEigen::new(m);
+            let expected = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            let mut values: Vec<_> = eigen.eigenvalues.iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let gap = (values[1] - values[0]) / m.trace();
+            let found = smallest_eigenvector_3(&m).unwrap();
+            assert!(1.0 - found.dot(&expected).abs() < 1e-13 / gap.powi(4), "gap {gap:e}");
+        }
+    }
+
+    #[test]
+    fn matrices_without_a_direction_have_none() {
+        assert_eq!(smallest_eigenvector_3(&Matrix3::zeros()), None);
+        assert_eq!(smallest_eigenvector_3(&Matrix3::from_element(f64::NAN)), None);
+    }
+}
