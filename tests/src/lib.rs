@@ -10,4 +10,5 @@ pub mod literal_quest;
 pub mod pairs;
 pub mod polynomial;
 pub mod quartics;
+pub mod scenes;
 pub mod solution_sets;

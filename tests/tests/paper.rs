@@ -11,6 +11,7 @@ use quest_tests::literal_quest::{
 };
 use quest_tests::polynomial::{Polynomial, monomials};
 use quest_tests::quartics::{self, Match, bilinear, quartic_of_triple, quartics, subsets};
+use quest_tests::scenes::scene;
 use quest_tests::solution_sets::{five_bearings, generic_rotations, literal};
 
 /// The seed of the dimensions and counts.
@@ -19,13 +20,13 @@ const SEED_DIMENSIONS: u64 = 71;
 /// Random problems: five points as in section 9 with 0.75 px of noise, which makes them generic.
 fn noisy_problems(count: u64) -> impl Iterator<Item = [Match; 5]> {
     let options = SceneOptions { noise_px: 0.75, ..SceneOptions::default() };
-    (0..count).map(move |i| five_bearings(&Scene::generate(&options, SEED_DIMENSIONS, i).unwrap().matches))
+    (0..count).map(move |i| five_bearings(&scene(&options, SEED_DIMENSIONS, i).matches))
 }
 
 fn noise_free_scenes(points: usize, count: u64) -> impl Iterator<Item = (Scene, Vec<Match>)> {
     let options = SceneOptions { points, ..SceneOptions::default() };
     (0..count).map(move |i| {
-        let scene = Scene::generate(&options, SEED_DIMENSIONS + 1, i).unwrap();
+        let scene = scene(&options, SEED_DIMENSIONS + 1, i);
         let bearings = scene.matches.iter().map(|m| (*m.bearing1(), *m.bearing2())).collect();
         (scene, bearings)
     })
@@ -33,7 +34,7 @@ fn noise_free_scenes(points: usize, count: u64) -> impl Iterator<Item = (Scene, 
 
 /// The rank, and by what factor the singular values fall at it.
 fn rank(a: &Mat<f64>) -> (usize, f64) {
-    let values = a.singular_values().unwrap();
+    let values = a.singular_values().unwrap_or_default();
     let rank = values.iter().filter(|s| **s > 1e-11 * values[0]).count();
     (rank, values.get(rank).map_or(0.0, |below| below / values[rank - 1]))
 }
@@ -63,7 +64,7 @@ fn section_7_1_finds_twenty_solutions() {
         let found = literal(&problem);
         assert_eq!(found.all.len(), 20, "problem {index}");
         // The quartics are real: complex solutions come in conjugate pairs.
-        assert!(found.real.len() % 2 == 0, "problem {index}: {} real solutions", found.real.len());
+        assert!(found.real.len().is_multiple_of(2), "problem {index}: {} real solutions", found.real.len());
     }
 }
 
@@ -89,7 +90,7 @@ fn half_turns_and_pure_translations_need_the_pre_rotation() {
     let translation = SceneOptions { motion: Motion::PureTranslation, ..SceneOptions::default() };
     for options in [half_turn, translation] {
         for index in 0..50 {
-            let scene = Scene::generate(&options, SEED_DIMENSIONS + 2, index).unwrap();
+            let scene = scene(&options, SEED_DIMENSIONS + 2, index);
             let q = constant(scene.truth.q_21);
             let t = scene.truth.t_21.normalize();
             let twisted = hamilton(constant(UnitQuaternion::new_unchecked(Quaternion::from_imag(t))), q);
