@@ -1,0 +1,90 @@
+//! Every error, and what it says.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Camera, CameraError, CameraModel};
+
+fn pinhole() -> Camera {
+    Camera::new(CameraModel::Pinhole, &[100.0, 100.0, 50.0, 50.0]).unwrap()
+}
+
+#[test]
+fn a_wrong_number_of_parameters_is_answered_with_their_names() {
+    for model in CameraModel::ALL {
+        let expected = model.param_names().len();
+        for found in [0, expected - 1, expected + 1, 40] {
+            let error = Camera::new(model, &vec![1.0; found]).unwrap_err();
+            assert_eq!(error, CameraError::ParameterCount { model, expected, found });
+        }
+    }
+    let message = Camera::new(CameraModel::Radial, &[1.0, 2.0]).unwrap_err().to_string();
+    assert_eq!(message, "RADIAL takes 5 parameters (f, cx, cy, k1, k2), found 2");
+}
+
+#[test]
+fn bad_parameters_are_named() {
+    let error = |params: [f64; 5]| Camera::new(CameraModel::Radial, &params).unwrap_err();
+    for bad in [f64::NAN, f64::INFINITY, -1e31] {
+        let found = error([1.0, 0.0, 0.0, bad, 0.0]);
+        assert!(matches!(found, CameraError::ParameterNotFinite { name: "k1", .. }), "{found}");
+    }
+    for focal in [0.0, -0.0, -600.0] {
+        let expected = CameraError::FocalLength { name: "f", found: focal };
+        assert_eq!(error([focal, 0.0, 0.0, 0.0, 0.0]), expected);
+    }
+    let found = Camera::new(CameraModel::Pinhole, &[1.0, -2.0, 0.0, 0.0]).unwrap_err();
+    assert_eq!(found.to_string(), "focal length fy of the camera is -2 pixels, expected a positive number");
+}
+
+#[test]
+fn a_matrix_that_is_not_a_calibration_matrix_is_refused() {
+    let k = Matrix3::new(100.0, 0.0, 50.0, 0.0, 100.0, 50.0, 0.0, 0.0, 1.0);
+    for (row, column, found, expected) in
+        [(0, 1, 0.5, 0.0), (1, 0, 3.0, 0.0), (2, 0, f64::NAN, 0.0), (2, 1, 1e-9, 0.0), (2, 2, 2.0, 1.0)]
+    {
+        let mut bad = k;
+        bad[(row, column)] = found;
+        let message = Camera::from_k(&bad).unwrap_err().to_string();
+        let start =
+            format!("entry ({row}, {column}) of the calibration matrix is {found}, expected {expected}");
+        assert!(message.starts_with(&start), "{message}");
+    }
+    let mut bad = k;
+    bad[(0, 0)] = f64::NAN;
+    assert!(matches!(Camera::from_k(&bad), Err(CameraError::ParameterNotFinite { name: "fx", .. })));
+    bad[(0, 0)] = -100.0;
+    assert_eq!(Camera::from_k(&bad), Err(CameraError::FocalLength { name: "fx", found: -100.0 }));
+}
+
+#[test]
+fn an_image_without_pixels_is_refused() {
+    let error = pinhole().with_size(640, 0).unwrap_err();
+    assert_eq!(error.to_string(), "the size of the image is 640 x 0, expected at least 1 x 1");
+}
+
+#[test]
+fn pixels_and_points_that_are_not_finite_are_refused() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let error = pinhole().bearing([1.0, bad]).unwrap_err();
+        assert_eq!(error.to_string(), format!("a coordinate is {bad}, expected a finite number"));
+        assert!(matches!(
+            pinhole().project(&Vector3::new(0.0, bad, 1.0)),
+            Err(CameraError::NotFinite { .. })
+        ));
+    }
+}
+
+#[test]
+fn points_that_are_not_in_front_are_refused() {
+    for z in [0.0, -2.0] {
+        assert_eq!(pinhole().project(&Vector3::new(0.1, 0.2, z)), Err(CameraError::BehindCamera { z }));
+    }
+    // In front, but so far to the side that the quotient overflows.
+    let error = pinhole().project(&Vector3::new(1e200, 0.0, 1e-200)).unwrap_err();
+    assert!(matches!(error, CameraError::PointOutOfDomain { found, .. } if found.is_finite()), "{error}");
+
+    let fisheye = Camera::new(CameraModel::SimpleRadialFisheye, &[100.0, 50.0, 50.0, 0.0]).unwrap();
+    for x in [Vector3::zeros(), -Vector3::z()] {
+        assert_eq!(fisheye.project(&x), Err(CameraError::NoDirection));
+    }
+}
