@@ -38,10 +38,9 @@ pub fn quintics(quartics: &[Polynomial]) -> Vec<Polynomial> {
 pub fn eigenvalue_matrix(quartics: &[Polynomial]) -> Mat<f64> {
     let (x1, x2): (Vec<_>, Vec<_>) = monomials(5).into_iter().partition(|m| m[0] > 0);
     let rows = quintics(quartics);
-    let (a1, a2) = (coefficient_matrix(&rows, &x1), coefficient_matrix(&rows, &x2));
-    // The rows of A are scaled as a whole, not the two parts of it apart.
-    let full = coefficient_matrix(&rows, &[x1.clone(), x2.clone()].concat());
-    let (a1, a2) = (full.subcols(0, a1.ncols()), full.subcols(x1.len(), a2.ncols()));
+    // Each row of A is scaled as a whole.
+    let a = coefficient_matrix(&rows, &[x1.clone(), x2.clone()].concat());
+    let (a1, a2) = (a.subcols(0, x1.len()), a.subcols(x1.len(), x2.len()));
     // (42), (43): x2 = q1 B̄ v with B̄ = −A2† A1.
     let b_bar = -(a2.thin_svd().expect("the SVD of A2").pseudoinverse() * a1);
     let v = monomials(4);
@@ -216,12 +215,5 @@ impl System {
             }
         }
         distinct
-    }
-
-    /// How far a solution is from being a double one: the smallest singular value of the derivatives. Rounding
-    /// moves it by about 1e-16 divided by this.
-    #[must_use]
-    pub fn separation(&self, q: Solution) -> f64 {
-        self.jacobian(q).0.singular_values().min()
     }
 }

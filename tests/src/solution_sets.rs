@@ -28,22 +28,13 @@ pub fn generic_rotations() -> (UnitQuaternion<f64>, UnitQuaternion<f64>) {
     )
 }
 
-/// A real solution of the literal method.
-#[derive(Clone, Copy, Debug)]
-pub struct RealSolution {
-    /// The rotation.
-    pub q_21: UnitQuaternion<f64>,
-    /// See [`System::separation`].
-    pub separation: f64,
-}
-
 /// What the literal method finds for a problem.
 #[derive(Clone, Debug)]
 pub struct Literal {
     /// Every solution, polished, each once.
     pub all: Vec<Solution>,
-    /// The real ones among them, each once.
-    pub real: Vec<RealSolution>,
+    /// The rotations of the real ones among them, each once.
+    pub real: Vec<UnitQuaternion<f64>>,
     /// The quartics.
     pub system: System,
 }
@@ -53,13 +44,13 @@ pub struct Literal {
 pub fn literal(matches: &[Match; 5]) -> Literal {
     let system = System::new(&quartics(matches));
     let all = system.distinct(&solve(matches, generic_rotations()));
-    let mut real: Vec<RealSolution> = Vec::new();
+    let mut real: Vec<UnitQuaternion<f64>> = Vec::new();
     for q in &all {
         let imaginary = q.iter().fold(0.0_f64, |largest, c| largest.max(c.im.abs()));
         let [w, x, y, z] = q.map(|c| c.re);
         let q_21 = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-        if imaginary < REAL && !real.iter().any(|r| angle_between(&r.q_21, &q_21) < 1e-9) {
-            real.push(RealSolution { q_21, separation: system.separation(*q) });
+        if imaginary < REAL && !real.iter().any(|r| angle_between(r, &q_21) < 1e-9) {
+            real.push(q_21);
         }
     }
     Literal { all, real, system }

@@ -17,7 +17,7 @@ const SEED_SYMMETRIES: u64 = 102;
 const SEED_PARALLAX: u64 = 103;
 
 /// Two sets of solutions of the same problem agree this well, in radians. Rounding is magnified by the nearness of
-/// other solutions: 1e-16 / 1e-7 for the closest pair in some thousand random problems.
+/// other solutions; in 2,000 problems with 0.75 px of noise no two of 18,104 solutions came close enough to matter.
 const SAME: f64 = 1e-6;
 
 /// No scene failed; compared with lists of failed scenes, so that a test that fails names them.
@@ -41,8 +41,7 @@ fn exact_candidates_are_the_real_solutions_of_section_7_1() {
     let mut solutions = 0;
     for options in [SceneOptions::default(), SceneOptions::realistic()] {
         for (index, scene) in scenes(noisy(options), SEED_LITERAL, 500).enumerate() {
-            let expected: Vec<_> =
-                literal(&five_bearings(&scene.matches)).real.iter().map(|s| s.q_21).collect();
+            let expected = literal(&five_bearings(&scene.matches)).real;
             let found = exact_rotations(&quest_eigen(Kinds::Exact, &scene.matches));
             assert!(same_rotations(&found, &expected), "{:?}, scene {index}", options.view);
             solutions += found.len();
@@ -143,9 +142,11 @@ fn twisted_partners_at_q1_zero_are_found() {
 
 #[test]
 fn the_length_of_t_is_the_parallax() {
-    // As the parallax vanishes all solutions run together and the eigenvalues lose their digits: from 1e-4 down some
-    // true poses are missed, and counted. Those that are found have the right length.
-    for (parallax, most_missed) in [(1e-1, 0), (1e-2, 0), (1e-3, 0), (1e-4, 3), (1e-5, 10), (1e-6, 40)] {
+    // As the parallax vanishes all solutions run together and the eigenvalues lose their digits: from 1e-3 down some
+    // true poses are missed, and counted. Those that are found have the right length. At 1e-3 it is one: scene 391,
+    // where a second solution lies within 1.4e-4 of the parallax at every parallax, and rounding makes a complex
+    // pair of the two.
+    for (parallax, most_missed) in [(1e-1, 0), (1e-2, 0), (1e-3, 1), (1e-4, 3), (1e-5, 10), (1e-6, 40)] {
         for base in [SceneOptions::default(), SceneOptions::realistic()] {
             let options = SceneOptions { motion: Motion::Parallax(parallax), ..base };
             let (mut wrong, mut missed) = (Vec::new(), 0);
