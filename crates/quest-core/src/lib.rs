@@ -30,6 +30,7 @@ mod degeneracy;
 pub mod feasibility;
 pub mod pose;
 pub mod quaternion;
+pub mod simulate;
 pub mod solver;
 pub mod structure;
 

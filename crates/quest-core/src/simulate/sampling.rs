@@ -1,0 +1,80 @@
+//! Random directions, rotations, translations and points.
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::{Angle, Layout, Motion};
+
+/// The box of the points: centre and half extent.
+const BOX_CENTRE: Vector3<f64> = Vector3::new(0.0, 0.0, 3.0);
+const BOX_HALF_EXTENT: f64 = 1.0;
+
+/// The generator of one scene: the seed is the key of the cipher, the index its stream, so that no two scenes
+/// share random numbers.
+pub(super) fn generator(seed: u64, index: u64) -> ChaCha8Rng {
+    let mut key = [0; 32];
+    key[..8].copy_from_slice(&seed.to_le_bytes());
+    let mut rng = ChaCha8Rng::from_seed(key);
+    rng.set_stream(index);
+    rng
+}
+
+pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Uniform in the cube of half extent 1.
+fn in_cube(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| rng.random_range(-1.0..=1.0))
+}
+
+/// Uniform on the unit sphere: a point uniform in the cube, kept if it lies in the unit ball.
+fn on_sphere(rng: &mut ChaCha8Rng) -> Unit<Vector3<f64>> {
+    loop {
+        let v = in_cube(rng);
+        // The inner bound keeps the direction accurate; it cuts off a millionth of the volume.
+        if (1e-4..=1.0).contains(&v.norm_squared()) {
+            return Unit::new_normalize(v);
+        }
+    }
+}
+
+pub(super) fn rotation(rng: &mut ChaCha8Rng, motion: Motion, angle: Angle) -> UnitQuaternion<f64> {
+    let axis = on_sphere(rng);
+    let angle = match angle {
+        Angle::UpTo(largest) => largest * rng.random::<f64>(),
+        Angle::Exactly(angle) => angle,
+    };
+    if motion == Motion::PureTranslation {
+        return UnitQuaternion::identity();
+    }
+    UnitQuaternion::from_axis_angle(&axis, angle)
+}
+
+pub(super) fn translation(rng: &mut ChaCha8Rng) -> Vector3<f64> {
+    in_cube(rng)
+}
+
+/// Where points are drawn from.
+pub(super) struct Region {
+    /// For coplanar points, two unit vectors that span the plane.
+    plane: Option<[Vector3<f64>; 2]>,
+}
+
+impl Region {
+    pub(super) fn new(rng: &mut ChaCha8Rng, layout: Layout) -> Self {
+        let orientation = on_sphere(rng);
+        let plane = (layout == Layout::Coplanar).then(|| {
+            let along = orientation.cross(&Vector3::ith(orientation.iamin(), 1.0)).normalize();
+            [along, orientation.cross(&along)]
+        });
+        Self { plane }
+    }
+
+    pub(super) fn point(&self, rng: &mut ChaCha8Rng) -> Vector3<f64> {
+        let p = BOX_HALF_EXTENT * in_cube(rng);
+        BOX_CENTRE + self.plane.map_or(p, |[u, v]| u * p.x + v * p.y)
+    }
+}

@@ -1,0 +1,167 @@
+//! One random scene.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_chacha::ChaCha8Rng;
+
+use super::sampling::{self, Region};
+use super::{Motion, SceneError, SceneOptions, View, is_inside_image, pixel_to_plane, plane_to_pixel};
+use crate::{Correspondence, RelativePose, correspondence};
+
+/// Images further from the optical axis than this, on the plane `z = 1`, are drawn again.
+const LARGEST_IMAGE_COORDINATE: f64 = 1e3;
+/// How many motions are tried.
+const MAX_MOTIONS: usize = 2_000;
+/// How many draws one point gets to be seen at a given motion.
+const MAX_DRAWS: usize = 200;
+/// How many times the length of t and the points that are not seen with it are redone in turn.
+const MAX_ROUNDS: usize = 50;
+
+/// Points seen by two cameras, and the pose between them.
+///
+/// Everything is scaled so that the mean absolute depth over both views is 1: `|t_21|` is the parallax of (63).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The true pose.
+    pub truth: RelativePose,
+    /// The points in the frame of camera 1.
+    pub points1: Vec<Vector3<f64>>,
+    /// Their images on the planes `z = 1`, by (27), with noise if there is any.
+    pub matches: Vec<Correspondence>,
+}
+
+impl Scene {
+    /// The scene number `index` of the sequence `seed`. The same two numbers and options give the same scene
+    /// everywhere, whatever else was generated before.
+    ///
+    /// # Errors
+    /// [`SceneError`] for options that no scene can meet, or for which none was found.
+    pub fn generate(options: &SceneOptions, seed: u64, index: u64) -> Result<Self, SceneError> {
+        options.check()?;
+        let mut rng = sampling::generator(seed, index);
+        for _ in 0..MAX_MOTIONS {
+            let draft = Draft::new(&mut rng, options);
+            if let Some((t_21, points1)) = draft.fill(&mut rng, options) {
+                let mut scene = Self::from_points(RelativePose::new(draft.q_21, t_21), points1)?;
+                scene.add_pixel_noise(&mut rng, options)?;
+                return Ok(scene);
+            }
+        }
+        Err(SceneError::NotSeen { attempts: MAX_MOTIONS, points: options.points })
+    }
+
+    /// The noise-free scene of these points, given in the frame of camera 1, and this pose. Both are rescaled to
+    /// a mean absolute depth of 1.
+    ///
+    /// # Errors
+    /// [`SceneError::NoPoints`], and [`SceneError::Image`] where a point has no image in one of the cameras.
+    pub fn from_points(pose: RelativePose, points1: Vec<Vector3<f64>>) -> Result<Self, SceneError> {
+        if points1.is_empty() {
+            return Err(SceneError::NoPoints);
+        }
+        let images1: Vec<_> = points1.iter().map(|x1| image(*x1)).collect();
+        let images2: Vec<_> = points1.iter().map(|x1| image(pose.q_21 * x1 + pose.t_21)).collect();
+        let matches = correspondence::from_image_points(&images1, &images2)?;
+        let scale = 1.0 / mean_depth(&pose.q_21, &pose.t_21, &points1);
+        let truth = RelativePose::new(pose.q_21, pose.t_21 * scale);
+        Ok(Self { truth, points1: points1.into_iter().map(|x1| x1 * scale).collect(), matches })
+    }
+
+    /// The points in the frame of camera 2, by (28).
+    pub fn points2(&self) -> impl Iterator<Item = Vector3<f64>> {
+        self.points1.iter().map(|x1| self.truth.q_21 * x1 + self.truth.t_21)
+    }
+
+    /// Gaussian noise and rounding, in pixels with K of (60).
+    fn add_pixel_noise(&mut self, rng: &mut ChaCha8Rng, options: &SceneOptions) -> Result<(), SceneError> {
+        if options.noise_px == 0.0 && !options.rounded {
+            return Ok(());
+        }
+        let mut disturb = |m: [f64; 2]| {
+            let pixel = plane_to_pixel(m).map(|c| c + options.noise_px * sampling::normal(rng));
+            pixel_to_plane(if options.rounded { pixel.map(f64::round) } else { pixel })
+        };
+        let (mut images1, mut images2) = (Vec::new(), Vec::new());
+        for (x1, x2) in self.points1.iter().zip(self.points2()) {
+            images1.push(disturb(image(*x1)));
+            images2.push(disturb(image(x2)));
+        }
+        self.matches = correspondence::from_image_points(&images1, &images2)?;
+        Ok(())
+    }
+}
+
+/// A motion and a place for the points, before it is known whether the cameras see them.
+struct Draft {
+    q_21: UnitQuaternion<f64>,
+    /// The translation, or, where the parallax is given, its direction.
+    t_21: Vector3<f64>,
+    region: Region,
+}
+
+impl Draft {
+    fn new(rng: &mut ChaCha8Rng, options: &SceneOptions) -> Self {
+        // Every motion draws the same numbers: scenes of the same seed and index that differ only in their
+        // motion can be compared.
+        let q_21 = sampling::rotation(rng, options.motion, options.angle);
+        let t_21 = sampling::translation(rng);
+        let t_21 = match options.motion {
+            Motion::General | Motion::PureTranslation => t_21,
+            Motion::Parallax(_) => t_21.normalize(),
+            Motion::PureRotation => Vector3::zeros(),
+        };
+        Self { q_21, t_21, region: Region::new(rng, options.layout) }
+    }
+
+    /// Draws the points. With a given parallax the length of t depends on all of them, and whether one of them
+    /// is seen depends on t: both are redone in turn until they agree.
+    fn fill(
+        &self,
+        rng: &mut ChaCha8Rng,
+        options: &SceneOptions,
+    ) -> Option<(Vector3<f64>, Vec<Vector3<f64>>)> {
+        let mut points: Vec<_> = (0..options.points).map(|_| self.region.point(rng)).collect();
+        for _ in 0..MAX_ROUNDS {
+            let t_21 = self.translation(options.motion, &points);
+            let seen = |x1: &Vector3<f64>| {
+                is_seen(*x1, options.view) && is_seen(self.q_21 * x1 + t_21, options.view)
+            };
+            if points.iter().all(seen) {
+                return Some((t_21, points));
+            }
+            for point in points.iter_mut().filter(|p| !seen(p)) {
+                *point = (0..MAX_DRAWS).map(|_| self.region.point(rng)).find(seen)?;
+            }
+        }
+        None
+    }
+
+    /// The translation, of length `s = p m(s)` where the parallax p is given; m(s) is the mean depth.
+    fn translation(&self, motion: Motion, points: &[Vector3<f64>]) -> Vector3<f64> {
+        let Motion::Parallax(parallax) = motion else { return self.t_21 };
+        let mut t_21 = Vector3::zeros();
+        // m changes by at most s/2, so that each step halves the error at least: 64 reach the last digit.
+        for _ in 0..64 {
+            t_21 = self.t_21 * (parallax * mean_depth(&self.q_21, &t_21, points));
+        }
+        t_21
+    }
+}
+
+/// The projection (27).
+fn image(x: Vector3<f64>) -> [f64; 2] {
+    [x.x / x.z, x.y / x.z]
+}
+
+fn is_seen(x: Vector3<f64>, view: View) -> bool {
+    let m = image(x);
+    match view {
+        View::Everywhere => m.iter().all(|c| c.abs() <= LARGEST_IMAGE_COORDINATE),
+        View::InBothImages => x.z > 0.0 && is_inside_image(plane_to_pixel(m)),
+    }
+}
+
+/// The mean absolute depth over both views, the denominator of (63).
+fn mean_depth(q_21: &UnitQuaternion<f64>, t_21: &Vector3<f64>, points1: &[Vector3<f64>]) -> f64 {
+    let sum: f64 = points1.iter().map(|x1| x1.z.abs() + (q_21 * x1 + t_21).z.abs()).sum();
+    sum / (2 * points1.len()) as f64
+}

@@ -1,0 +1,155 @@
+//! Matches that determine no pose, or only a rotation, are named for what they are.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use quest_core::simulate::{Angle, Layout, Motion, Scene, SceneOptions, View};
+use quest_core::solver::Kinds;
+use quest_core::{CandidateKind, Correspondence, Degeneracy, RelativePose};
+use quest_tests::scenes::{quest_eigen, scene, scenes};
+
+const SEED_DEGENERATE: u64 = 200;
+
+fn pose() -> RelativePose {
+    let q_21 = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.3, 0.2));
+    RelativePose::new(q_21, Vector3::new(0.4, -0.2, 0.1))
+}
+
+fn verdict(matches: &[Correspondence]) -> (Option<Degeneracy>, usize) {
+    let exact = quest_eigen(Kinds::Exact, matches);
+    let all = quest_eigen(Kinds::All, matches);
+    assert_eq!(exact.degeneracy(), all.degeneracy());
+    (exact.degeneracy(), exact.len())
+}
+
+#[test]
+fn general_matches_have_none() {
+    for options in [SceneOptions::default(), SceneOptions::realistic()] {
+        for noise_px in [0.0, 0.75] {
+            for layout in [Layout::General, Layout::Coplanar] {
+                let options = SceneOptions { noise_px, layout, ..options };
+                assert!(scenes(options, SEED_DEGENERATE, 200).all(|s| verdict(&s.matches).0.is_none()));
+            }
+        }
+    }
+}
+
+#[test]
+fn too_few() {
+    let one = scene(&SceneOptions::default(), SEED_DEGENERATE, 0);
+    for n in 0..5 {
+        assert_eq!(verdict(&one.matches[..n]), (Some(Degeneracy::TooFewMatches), 0));
+    }
+}
+
+#[test]
+fn coincident() {
+    let one = scene(&SceneOptions::default(), SEED_DEGENERATE, 0);
+    assert_eq!(verdict(&[one.matches[0]; 5]), (Some(Degeneracy::Coincident), 0));
+    // In one view only: five points on one ray of camera 1.
+    let on_a_ray = [1.0, 1.5, 2.0, 2.5, 3.0].map(|z| Vector3::new(0.1, 0.2, 1.0) * z);
+    let scene = Scene::from_points(pose(), on_a_ray.to_vec()).unwrap();
+    assert_eq!(verdict(&scene.matches), (Some(Degeneracy::Coincident), 0));
+}
+
+#[test]
+fn duplicate() {
+    for one in scenes(SceneOptions::default(), SEED_DEGENERATE + 1, 50) {
+        for (copy, of) in [(1, 0), (4, 0), (4, 3)] {
+            let mut matches = one.matches.clone();
+            matches[copy] = matches[of];
+            assert_eq!(verdict(&matches), (Some(Degeneracy::Duplicate), 0));
+        }
+    }
+    // Enough others are left.
+    for one in scenes(SceneOptions { points: 6, ..SceneOptions::default() }, SEED_DEGENERATE + 1, 50) {
+        let mut matches = one.matches.clone();
+        matches[5] = matches[2];
+        assert!(verdict(&matches).0.is_none());
+    }
+}
+
+#[test]
+fn collinear() {
+    let from = Vector3::new(-0.5, 0.3, 2.0);
+    let along = Vector3::new(1.0, -0.4, 0.7);
+    let line: Vec<_> = [0.0, 0.3, 0.5, 0.8, 1.0].iter().map(|s| from + along * *s).collect();
+    let scene = Scene::from_points(pose(), line.clone()).unwrap();
+    assert_eq!(verdict(&scene.matches), (Some(Degeneracy::Collinear), 0));
+    // Four of five are one too many.
+    let mut four = line.clone();
+    four[2] = Vector3::new(0.3, 0.4, 2.5);
+    let scene = Scene::from_points(pose(), four.clone()).unwrap();
+    assert_eq!(verdict(&scene.matches), (Some(Degeneracy::Collinear), 0));
+    // Three are not.
+    four[4] = Vector3::new(-0.6, -0.5, 3.1);
+    let scene = Scene::from_points(pose(), four).unwrap();
+    assert!(verdict(&scene.matches).0.is_none());
+}
+
+fn is_named_pure_rotation(one: &Scene, kinds: Kinds) -> bool {
+    let found = quest_eigen(kinds, &one.matches);
+    found.degeneracy() == Some(Degeneracy::PureRotation)
+        && found.len() == 1
+        && found[0].pose.rotation_error(&one.truth) < 1e-12
+        && found[0].pose.t_21 == Vector3::zeros()
+}
+
+#[test]
+fn pure_rotation() {
+    for angle in [Angle::UpTo(TAU), SceneOptions::realistic().angle] {
+        for layout in [Layout::General, Layout::Coplanar] {
+            for points in [5, 6, 20] {
+                let base = SceneOptions { view: View::InBothImages, ..SceneOptions::default() };
+                let options = SceneOptions { motion: Motion::PureRotation, layout, points, angle, ..base };
+                for one in scenes(options, SEED_DEGENERATE + 2, 100) {
+                    assert!(is_named_pure_rotation(&one, Kinds::All), "{options:?}");
+                    assert!(is_named_pure_rotation(&one, Kinds::Exact), "{options:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Section 9.3 turns the camera by up to 360°: points come to lie behind it and are projected all the same, so that
+/// some bearings are opposite to the rotated ones.
+#[test]
+#[ignore = "the alignment of bearings knows no opposite ones: no candidate, and no reason given"]
+fn pure_rotation_with_points_behind_camera_2() {
+    let options = SceneOptions { motion: Motion::PureRotation, ..SceneOptions::default() };
+    for one in scenes(options, SEED_DEGENERATE + 2, 100) {
+        assert!(is_named_pure_rotation(&one, Kinds::All));
+        assert!(is_named_pure_rotation(&one, Kinds::Exact));
+    }
+}
+
+#[test]
+fn noisy_pure_rotation_has_a_candidate_near_the_truth() {
+    let options = SceneOptions { motion: Motion::PureRotation, noise_px: 0.75, ..SceneOptions::realistic() };
+    let mut sum = 0.0;
+    for one in scenes(options, SEED_DEGENERATE + 3, 300) {
+        let found = quest_eigen(Kinds::All, &one.matches);
+        assert_eq!(found.degeneracy(), None);
+        let best = found.iter().map(|c| c.pose.rotation_error(&one.truth)).fold(f64::INFINITY, f64::min);
+        sum += best;
+        let rotation = found.iter().find(|c| c.kind == CandidateKind::RotationOnly).unwrap();
+        // 0.75 px are 0.7 mrad; five points spread over the image leave a few times that about the line of sight.
+        assert!(rotation.pose.rotation_error(&one.truth) < 0.05);
+    }
+    assert!(sum / 300.0 < 0.003, "{}", sum / 300.0);
+}
+
+#[test]
+fn identical_images() {
+    let one = scene(&SceneOptions::default(), SEED_DEGENERATE, 3);
+    let same: Vec<_> = one
+        .matches
+        .iter()
+        .map(|m| Correspondence::from_bearings((*m.bearing1()).into(), (*m.bearing1()).into()).unwrap())
+        .collect();
+    let found = quest_eigen(Kinds::Exact, &same);
+    assert_eq!(found.degeneracy(), Some(Degeneracy::PureRotation));
+    assert_eq!(found.len(), 1);
+    assert!(found[0].pose.q_21.angle() < 1e-15);
+    assert!(found[0].pose.t_21 == Vector3::zeros());
+}
