@@ -87,7 +87,7 @@ type Linear = [f64; 4];
 type Quadratic = [f64; 10];
 type Cubic = [f64; 20];
 
-#[inline(always)]
+#[inline]
 fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
     for i in 0..4 {
         for j in 0..4 {
@@ -96,7 +96,7 @@ fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
     for i in 0..10 {
         for j in 0..4 {
@@ -105,7 +105,7 @@ fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn scaled(a: &Linear, factor: f64) -> Linear {
     a.map(|x| factor * x)
 }
@@ -119,7 +119,7 @@ struct Forms {
 }
 
 impl Forms {
-    #[inline(always)]
+    #[inline]
     fn new(basis: &[Coordinates; 4], p: f64) -> Self {
         let form = |row: usize| -> Linear { std::array::from_fn(|m| basis[m][row]) };
         let [t0, t1, t2, xx, yy, zz, xy, xz, yz]: [Linear; 9] = std::array::from_fn(form);
@@ -134,7 +134,7 @@ impl Forms {
     }
 
     /// `Λ`, by its upper triangle.
-    #[inline(always)]
+    #[inline]
     fn lambda(&self, p: f64) -> [[Quadratic; 3]; 3] {
         let mut lambda = [[[0.0; 10]; 3]; 3];
         let twice = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, 2.0)));
@@ -172,7 +172,7 @@ impl Forms {
     }
 
     /// `det(tr(S) I − 2 S)`.
-    #[inline(always)]
+    #[inline]
     fn tenth(&self) -> Cubic {
         let mut d = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, -2.0)));
         for i in 0..3 {

@@ -18,7 +18,7 @@ fn cross<T: ComplexField + Copy>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
 }
 
 #[inline]
-fn square_size<T: ComplexField<RealField = f64> + Copy>(v: &[T]) -> f64 {
+fn square_size<T: ComplexField<RealField = f64> + Copy, const N: usize>(v: &[T; N]) -> f64 {
     v.iter().map(|x| x.modulus_squared()).sum()
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn decompose<T: ComplexField<RealField = f64> + Copy>(
     let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j] * scale));
     let cofactors: [Vector<T>; 3] =
         std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
-    let longest = cofactors[largest(&cofactors.each_ref().map(|c| square_size(c)))];
+    let longest = cofactors[largest(&cofactors.each_ref().map(square_size))];
     let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt();
     let inverse = T::one() / length;
     let t = longest.map(|x| x * inverse);
@@ -65,7 +65,7 @@ fn quaternion<T: ComplexField<RealField = f64> + Copy>(columns: &[Vector<T>; 3])
     let diagonal = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
     let (wx, wy, wz) = (zy - yz, xz - zx, yx - xy);
     let (sxy, sxz, syz) = (yx + xy, zx + xz, zy + yz);
-    match largest(&diagonal.map(|d| d.modulus_squared())) {
+    match largest(&diagonal.map(ComplexField::modulus_squared)) {
         0 => [diagonal[0], wx, wy, wz],
         1 => [wx, diagonal[1], sxy, sxz],
         2 => [wy, sxy, diagonal[2], syz],

@@ -4,8 +4,8 @@ mod aligned;
 mod cubics;
 mod essential;
 mod motion;
-mod quest;
-mod quest_eigen;
+pub mod quest;
+pub mod quest_eigen;
 mod shortlist;
 
 use std::str::FromStr;

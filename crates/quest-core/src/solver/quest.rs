@@ -4,15 +4,15 @@
 //! the depths that the essential matrix, divided by its own norm, no longer holds the rotation.
 //!
 //! **Steps** for five matches:
-//! 1. The rotation `R0` that best aligns the bearings, and the parallax `p` that it leaves: [`super::aligned`]. With none
+//! 1. The rotation `R0` that best aligns the bearings, and the parallax `p` that it leaves (`aligned.rs`). With none
 //!    left the motion is a pure rotation.
 //! 2. The null space of the five rows `[n/p, sym(b cᵀ)]`: the essential matrix is `[t]× + p S`, `S` symmetric.
-//! 3. Ten cubics without the factor `p`, a polynomial of degree ten, its real roots by Sturm's theorem:
-//!    [`super::cubics`].
+//! 3. Ten cubics without the factor `p`, a polynomial of degree ten, its real roots by Sturm's theorem
+//!    (derived in `cubics.rs`).
 //! 4. Each root gives an essential matrix, two rotations and a translation; Newton's iteration on the five
 //!    parameters of the motion brings the constraints to zero.
 //! 5. A complex pair of roots gives two complex quaternions: their real parts. Under noise the true pose often hides there.
-//! 6. Translation and depths with one scale: [`crate::structure`].
+//! 6. Translation and depths with one scale: [`structure`](crate::structure).
 //!
 //! For more matches the null space is that of all rows in the least-squares sense, and every solution is refined over
 //! all matches.
@@ -34,7 +34,7 @@ use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
-/// The default solver; see the [module](self) for its steps.
+/// The default solver; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quest {
     /// Which candidates are returned.

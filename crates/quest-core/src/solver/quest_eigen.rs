@@ -37,7 +37,7 @@ use crate::quaternion::{bilinear, minors_with_q, minors_without_q, ten_quartics}
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
-/// The eigenvalue method of section 7.1 of the paper; see the [module](self) for its steps.
+/// The eigenvalue method of section 7.1 of the paper; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct QuestEigen {
     /// Which candidates are returned.
