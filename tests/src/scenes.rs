@@ -2,7 +2,7 @@
 
 use nalgebra::UnitQuaternion;
 use quest_core::simulate::{Scene, SceneOptions};
-use quest_core::solver::{Kinds, PoseSolver, QuestEigen};
+use quest_core::solver::{Kinds, SolverName};
 use quest_core::{CandidateKind, Candidates, Correspondence};
 
 /// A scene that is known to exist.
@@ -16,11 +16,11 @@ pub fn scenes(options: SceneOptions, seed: u64, count: u64) -> impl Iterator<Ite
     (0..count).map(move |index| scene(&options, seed, index))
 }
 
-/// What `quest-eigen` finds.
+/// What a solver finds.
 #[must_use]
-pub fn quest_eigen(kinds: Kinds, matches: &[Correspondence]) -> Candidates {
+pub fn solve(solver: SolverName, kinds: Kinds, matches: &[Correspondence]) -> Candidates {
     let mut out = Candidates::new();
-    QuestEigen { kinds }.solve(matches, &mut out);
+    solver.solve(kinds, matches, &mut out);
     out
 }
 

@@ -2,9 +2,9 @@
 #![expect(clippy::print_stdout, reason = "says what was found, and where nothing was tested")]
 
 use quest_core::Correspondence;
-use quest_core::solver::Kinds;
+use quest_core::solver::{Kinds, SolverName};
 use quest_tests::pairs::load;
-use quest_tests::scenes::quest_eigen;
+use quest_tests::scenes::solve;
 use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,7 @@ fn every_pair_has_a_candidate() {
         assert!(inliers.len() >= 5, "{}: {} inliers", pair.name, inliers.len());
         for _ in 0..SAMPLES {
             let sample: [Correspondence; 5] = inliers.sample_array(&mut rng).unwrap();
-            let found = quest_eigen(Kinds::All, &sample);
+            let found = solve(SolverName::default(), Kinds::All, &sample);
             assert!(!found.is_empty(), "{}: {:?}", pair.name, found.degeneracy());
             let finite = |x: f64| x.is_finite();
             assert!(found.iter().all(|c| finite(c.residual) && c.pose.t_21.iter().copied().all(finite)));

@@ -4,7 +4,7 @@ use std::{collections::HashSet, path::PathBuf};
 
 use clap::{Args, ValueEnum};
 use quest_core::{
-    Camera, Candidates, InputError,
+    Camera, Candidates, Degeneracy, InputError,
     solver::{Kinds, SolverName},
 };
 use quest_io::{Fault, Output, Pair, ReadError, SolveRecord, WriteError};
@@ -136,7 +136,7 @@ fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<O
     let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
     let most_in_front = record.candidates.iter().map(|c| c.in_front).max();
     let hidden = if arguments.all { 0 } else { record.drop_unfeasible() };
-    let heading = heading(pair, &record, found.degeneracy().map(words::degeneracy));
+    let heading = heading(pair, &record, found.degeneracy());
     let is_empty = record.candidates.is_empty();
     writer.write(&heading, record, pair.focal_length())?;
 
@@ -147,7 +147,7 @@ fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<O
                  --all lists them",
                 matches.len()
             ),
-            (None, Some(degeneracy)) => words::degeneracy(degeneracy).to_owned(),
+            (None, Some(degeneracy)) => degeneracy.to_string(),
             (None, None) => "the solver found no candidate".to_owned(),
         };
         words::say("no pose", &format!("{}: {why}", pair.place));
@@ -164,9 +164,9 @@ fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<O
 }
 
 /// The line above the table.
-fn heading(pair: &Pair, record: &SolveRecord, degeneracy: Option<&str>) -> String {
+fn heading(pair: &Pair, record: &SolveRecord, degeneracy: Option<Degeneracy>) -> String {
     let name = record.name.clone().unwrap_or_else(|| pair.place.to_string());
-    let degeneracy = degeneracy.map(|words| format!(", {words}")).unwrap_or_default();
+    let degeneracy = degeneracy.map(|d| format!(", {d}")).unwrap_or_default();
     words::one_line(&format!("{name}: {} matches, solver {}{degeneracy}", record.matches, record.solver))
 }
 

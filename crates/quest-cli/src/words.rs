@@ -2,8 +2,6 @@
 
 use std::io::{self, Write};
 
-use quest_core::Degeneracy;
-
 /// Longer lines are cut: a message may quote what it found in a file.
 const LONGEST: usize = 400;
 
@@ -23,21 +21,6 @@ pub(crate) fn one_line(text: &str) -> String {
         if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
     }
     line
-}
-
-/// What a degeneracy means.
-pub(crate) fn degeneracy(degeneracy: Degeneracy) -> &'static str {
-    match degeneracy {
-        Degeneracy::TooFewMatches => "there are fewer matches than the solver needs",
-        Degeneracy::Coincident => "all points coincide in one view",
-        Degeneracy::Duplicate => "matches are repeated, and too few distinct ones are left",
-        Degeneracy::Collinear => "too many of the points lie on a line",
-        Degeneracy::RankDeficient => "the matches do not give five independent constraints",
-        Degeneracy::PureRotation => {
-            "pure rotation: a rotation alone explains the matches, there is no translation and no depth"
-        }
-        other => other.name(),
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What every solver returns: a short list of poses.
 
+use std::fmt;
 use std::ops::Deref;
 
 use crate::{Correspondence, RelativePose};
@@ -62,6 +63,22 @@ impl Degeneracy {
     }
 }
 
+/// What it means, in words: a clause for the end of a sentence.
+impl fmt::Display for Degeneracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TooFewMatches => "there are fewer matches than the solver needs",
+            Self::Coincident => "all points coincide in one view",
+            Self::Duplicate => "matches are repeated, and too few distinct ones are left",
+            Self::Collinear => "too many of the points lie on a line",
+            Self::RankDeficient => "the matches do not give five independent constraints",
+            Self::PureRotation => {
+                "pure rotation: a rotation alone explains the matches, there is no translation and no depth"
+            }
+        })
+    }
+}
+
 /// One pose that may be the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -84,7 +101,11 @@ impl Candidate {
     }
 }
 
-/// The candidates of one solve, best first: most points in front, then the smallest residual.
+/// The candidates of one solve, best first: most points in front, then the smallest residual, then the smallest
+/// rotation.
+///
+/// Residuals below 1e-12 rad count as equal: between exact solutions they are rounding, which must not decide the
+/// order. The smaller rotation is a matter of the order alone, not a sign of the true pose.
 ///
 /// Holds at most [`Candidates::CAPACITY`] and never allocates. Dereferences to a slice.
 #[derive(Clone, Debug)]

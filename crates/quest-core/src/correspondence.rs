@@ -2,11 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::camera::MAX_IMAGE_COORDINATE;
 use crate::{Camera, CameraError};
-
-/// Coordinates on the plane `z = 1` beyond this are refused: the viewing ray can no longer be told from one
-/// at a right angle to the optical axis (`1 / sqrt(f64::EPSILON)`).
-pub const MAX_IMAGE_COORDINATE: f64 = 6.7e7;
 
 /// One match: the viewing rays of the same point in camera 1 and in camera 2.
 ///
@@ -89,6 +86,14 @@ pub enum InputError {
         /// How many the solver needs.
         needed: usize,
     },
+    /// A table with a row for every three matches does not fit in memory.
+    #[error("{found} matches make {rows} rows, which do not fit in memory")]
+    TooManyMatches {
+        /// How many there are.
+        found: usize,
+        /// How many rows that would be.
+        rows: u128,
+    },
 }
 
 impl Correspondence {
@@ -105,7 +110,7 @@ impl Correspondence {
     /// A match of two points on the planes `z = 1` of the cameras (normalised image coordinates).
     ///
     /// # Errors
-    /// [`MatchError::NotFinite`] and [`MatchError::TooFar`].
+    /// [`MatchError::NotFinite`], and [`MatchError::TooFar`] beyond [`MAX_IMAGE_COORDINATE`].
     pub fn from_image_points(x1: [f64; 2], x2: [f64; 2]) -> Result<Self, MatchError> {
         for (view, x) in [(1, x1), (2, x2)] {
             for value in x {

@@ -8,6 +8,12 @@ use crate::{Correspondence, Degeneracy};
 /// of a constraint in double precision.
 const SAME: f64 = 1e-10;
 
+/// Whether the bearings of camera 1 are parallel, in the same direction or the opposite one: a whole circle of rotations
+/// aligns them with those of camera 2.
+pub(crate) fn all_parallel(matches: &[Correspondence]) -> bool {
+    matches.iter().all(|m| m.bearing1().cross(matches[0].bearing1()).norm() < SAME)
+}
+
 /// Names the reason why matches give fewer than five independent constraints. Quadratic in their number; called only
 /// when the constraints have been found short.
 pub(crate) fn diagnose(matches: &[Correspondence]) -> Degeneracy {

@@ -79,10 +79,14 @@ impl RelativePose {
     /// The depths `(z1, z2)` of a match, in the unit of `t_21`: `z1 R x1 + t = z2 x2`, equation (28), in the
     /// least-squares sense where the two rays do not meet.
     ///
-    /// Depths multiply the vectors as they were given to [`Correspondence`]. `None` where the rays are
-    /// parallel, so that no depth is determined.
+    /// Depths multiply the vectors as they were given to [`Correspondence`]. `None` where no depth is determined:
+    /// the translation is zero, or the rays are parallel.
     #[must_use]
     pub fn depths(&self, m: &Correspondence) -> Option<(f64, f64)> {
+        // Without a translation every depth fits, also where noise keeps the rays from being parallel.
+        if self.t_21.amax() <= 0.0 {
+            return None;
+        }
         let c = self.q_21 * m.bearing1();
         let n = m.bearing2().cross(&c);
         let nn = n.norm_squared();

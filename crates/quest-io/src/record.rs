@@ -1,7 +1,7 @@
 //! Results as they stand in files.
 
 use nalgebra::Matrix3;
-use quest_core::{Candidate, Candidates, Correspondence};
+use quest_core::{Candidate, Candidates, Correspondence, RelativePose};
 use serde::Serialize;
 
 use crate::Truth;
@@ -84,7 +84,7 @@ impl CandidateRecord {
     #[must_use]
     pub fn new(candidate: &Candidate, matches: &[Correspondence], truth: &Truth) -> Self {
         let pose = &candidate.pose;
-        let (depths1, depths2) = matches.iter().map(|m| depths(candidate, m)).unzip();
+        let (depths1, depths2) = matches.iter().map(|m| depths(pose, m)).unzip();
         Self {
             kind: candidate.kind.name(),
             q_21: pose.wxyz().map(unsigned_zero),
@@ -101,11 +101,9 @@ impl CandidateRecord {
     }
 }
 
-fn depths(candidate: &Candidate, m: &Correspondence) -> (Option<f64>, Option<f64>) {
-    // Without a translation every depth fits, also where noise keeps the rays from being parallel.
-    let depths = if candidate.pose.t_21.amax() > 0.0 { candidate.depths(m) } else { None };
+fn depths(pose: &RelativePose, m: &Correspondence) -> (Option<f64>, Option<f64>) {
     let finite = |z: f64| z.is_finite().then_some(z);
-    depths.map_or((None, None), |(z1, z2)| (finite(z1), finite(z2)))
+    pose.depths(m).map_or((None, None), |(z1, z2)| (finite(z1), finite(z2)))
 }
 
 fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
@@ -121,7 +119,7 @@ fn unsigned_zero(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
-    use quest_core::{CandidateKind, RelativePose, correspondence};
+    use quest_core::{CandidateKind, correspondence};
 
     use super::*;
 

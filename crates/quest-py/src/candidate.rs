@@ -46,10 +46,8 @@ impl Candidate {
 
 /// The depths of a match, infinite where undetermined: NaN would make two equal candidates differ.
 fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
-    // Without a translation the least-squares depths are zero, whatever the true ones.
-    let depths = if pose.t_21.amax() > 0.0 { pose.depths(m) } else { None };
     let finite = |z: f64| if z.is_finite() { z } else { f64::INFINITY };
-    depths.map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
+    pose.depths(m).map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
 }
 
 /// The same pose with the sign of the quaternion that is shown, so that a pickled copy is equal.

@@ -1,7 +1,7 @@
 //! The errors Python sees: one class a cause, all of them a `ValueError`.
 
 use pyo3::create_exception;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use quest_core::{CameraError, Degeneracy, InputError, MatchError};
 
@@ -44,6 +44,7 @@ pub(crate) fn input(error: &InputError) -> PyErr {
         },
         InputError::LengthMismatch { .. } => ShapeMismatch::new_err(message),
         InputError::TooFewMatches { .. } => TooFewMatches::new_err(message),
+        InputError::TooManyMatches { .. } => PyMemoryError::new_err(message),
         _ => QuestError::new_err(message),
     }
 }
@@ -62,14 +63,5 @@ fn of_camera(error: &CameraError, message: String) -> PyErr {
 
 /// The exception where a degeneracy left no candidate.
 pub(crate) fn degenerate(degeneracy: Degeneracy) -> PyErr {
-    let reason = match degeneracy {
-        Degeneracy::TooFewMatches => "there are fewer matches than the solver needs",
-        Degeneracy::Coincident => "all points coincide in one view",
-        Degeneracy::Duplicate => "matches are repeated, and too few distinct ones are left",
-        Degeneracy::Collinear => "too many of the points lie on a line",
-        Degeneracy::RankDeficient => "they give fewer than five independent constraints",
-        Degeneracy::PureRotation => "a rotation alone explains them; kinds=\"all\" returns it",
-        _ => degeneracy.name(),
-    };
-    DegenerateInput::new_err(format!("the matches do not determine a pose: {reason}"))
+    DegenerateInput::new_err(format!("the matches do not determine a pose: {degeneracy}"))
 }

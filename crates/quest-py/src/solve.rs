@@ -1,7 +1,6 @@
 //! `solve`, `constraint_matrix` and the table of solvers.
 
 use numpy::PyArray2;
-use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use quest_core::solver::{Kinds, SolverName};
 use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence, quaternion};
@@ -114,20 +113,9 @@ pub(crate) fn constraint_matrix<'py>(
     let views = Views::new(x1, x2, None, None)?;
     let rows = py.detach(|| {
         let matches = views.matches().map_err(|error| errors::input(&error))?;
-        reserve_rows(matches.len())?;
         quaternion::constraint_matrix(&matches).map_err(|error| errors::input(&error))
     })?;
     Ok(arrays::to_numpy(py, rows))
-}
-
-/// Whether the rows of N matches fit in memory at all: the core would abort where they do not.
-fn reserve_rows(matches: usize) -> PyResult<()> {
-    let n = matches as u128;
-    let rows = n * n.saturating_sub(1) * n.saturating_sub(2) / 6;
-    let fits =
-        usize::try_from(rows).is_ok_and(|rows| Vec::<[f64; 35]>::new().try_reserve_exact(rows).is_ok());
-    let message = || format!("{matches} matches make {rows} rows, which do not fit in memory");
-    if fits { Ok(()) } else { Err(PyMemoryError::new_err(message())) }
 }
 
 /// The rows of ``solvers()``.

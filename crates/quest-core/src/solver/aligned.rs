@@ -47,6 +47,10 @@ pub(crate) struct Alignment {
 impl Alignment {
     pub(crate) fn new(matches: &[Correspondence]) -> Self {
         let rays = Self::with_rotation(best_rotation(matches), matches);
+        // Bearings in a plane are aligned as lines just as well by another half turn: rounding must not choose that.
+        if rays.is_pure_rotation() {
+            return rays;
+        }
         // The constraints hold for lines as well as for rays, and so must what keeps them well scaled.
         match best_rotation_of_lines(matches).map(|q0_21| Self::with_rotation(q0_21, matches)) {
             Some(lines) if lines.parallax < rays.parallax => lines,

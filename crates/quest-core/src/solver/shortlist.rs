@@ -5,6 +5,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::{Alignment, Gram};
 use super::motion::{Motion, Outcome};
+use crate::degeneracy::{all_parallel, diagnose};
+use crate::feasibility::in_front;
 use crate::structure::{Completed, translation_direction, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
@@ -156,10 +158,14 @@ pub(crate) fn rotation_only(alignment: &Alignment, matches: &[Correspondence]) -
     candidate(CandidateKind::RotationOnly, alignment.q0_21, &direction, matches)
 }
 
-/// The one candidate of an exact pure rotation.
+/// The one candidate of an exact pure rotation, unless the matches leave that undetermined too.
 pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], out: &mut Candidates) {
+    if all_parallel(matches) {
+        return out.set_degeneracy(diagnose(matches));
+    }
     let pose = RelativePose::new(alignment.q0_21, Vector3::zeros());
-    let (kind, residual, in_front) = (CandidateKind::RotationOnly, pose.residual(matches), matches.len());
+    let (kind, residual) = (CandidateKind::RotationOnly, pose.residual(matches));
+    let in_front = in_front(&pose, matches);
     out.set_degeneracy(Degeneracy::PureRotation);
     out.push(Candidate { kind, pose, residual, in_front });
 }
