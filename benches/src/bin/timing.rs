@@ -64,7 +64,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let clean = scenes(&arguments, 0.0)?;
     let mut rows: Vec<_> = cells.iter().map(|&cell| solver_row(cell, &noisy, &clean)).collect();
     if arguments.points == 5 {
-        rows.extend(peer_row(&noisy, &clean));
+        #[cfg(feature = "peers")]
+        rows.push(peer_row(&noisy, &clean));
         rows.push(stage_row(&noisy));
     }
     // The rounds of the rows take turns, so that a disturbance of the machine falls on all of them.
@@ -134,7 +135,7 @@ fn stage_row(noisy: &[Scene]) -> Row<'_> {
 }
 
 #[cfg(feature = "peers")]
-fn peer_row<'a>(noisy: &'a [Scene], clean: &[Scene]) -> Option<Row<'a>> {
+fn peer_row<'a>(noisy: &'a [Scene], clean: &[Scene]) -> Row<'a> {
     use quest_benches::peers::{essential_error, kornia, kornia_problem};
     let problems: Vec<_> = noisy.iter().filter_map(|s| kornia_problem(&s.matches)).collect();
     let candidates = mean(problems.iter().map(|p| kornia(p).len() as f64));
@@ -148,17 +149,12 @@ fn peer_row<'a>(noisy: &'a [Scene], clean: &[Scene]) -> Option<Row<'a>> {
             black_box(kornia(black_box(problem)));
         }
     };
-    Some(Row {
+    Row {
         name: "kornia-3d essential_5pt (matrices, no poses)".to_owned(),
         round: Box::new(round),
         times_us: Vec::new(),
         quality: Some((candidates, found)),
-    })
-}
-
-#[cfg(not(feature = "peers"))]
-fn peer_row<'a>(_: &'a [Scene], _: &[Scene]) -> Option<Row<'a>> {
-    None
+    }
 }
 
 fn table(rows: &[Row]) -> Table {
