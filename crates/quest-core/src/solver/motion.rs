@@ -46,10 +46,11 @@ impl Motion {
 
     /// Whether two motions have the same essential matrix and rotation, to `tolerance` in radians. Both parts
     /// are needed: with little parallax all solutions have nearly the same rotation.
+    #[inline]
     pub(crate) fn is_close(&self, other: &Self, tolerance: f64) -> bool {
-        let cosine = self.q_21.coords.dot(&other.q_21.coords).abs();
-        self.direction.cross(&other.direction).norm() < tolerance
-            && (1.0 - cosine) < 0.125 * tolerance * tolerance + 4.0 * f64::EPSILON
+        let near = |cosine: f64, angle: f64| 1.0 - cosine * cosine < angle * angle + 4.0 * f64::EPSILON;
+        near(self.direction.dot(&other.direction), tolerance)
+            && near(self.q_21.coords.dot(&other.q_21.coords), 0.5 * tolerance)
     }
 
     /// The essential matrix `[t]× R`.
@@ -83,20 +84,20 @@ impl Motion {
         for _ in 0..MAX_NEWTON_STEPS {
             let tangent = tangent_basis(&self.direction);
             let r_21 = self.q_21.to_rotation_matrix();
-            let (mut jacobian, mut step) = ([[0.0; 5]; 5], [0.0; 5]);
+            let mut equations = [[0.0; 6]; 5];
             for (i, m) in matches.iter().enumerate() {
                 let row = Row::new(m.bearing2(), &(r_21 * m.bearing1()), &self.direction, &tangent);
-                jacobian[i] = row.gradient.into();
-                step[i] = -row.residual;
+                let [g0, g1, g2, g3, g4]: [f64; 5] = row.gradient.into();
+                equations[i] = [g0, g1, g2, g3, g4, -row.residual];
             }
-            let singular = !elimination::solve(&mut jacobian, &mut step);
+            let Some(step) = elimination::solve(&mut equations) else { return Outcome::Stalled };
             let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if singular || length > 1.0 {
+            if length > 1.0 {
                 return Outcome::Stalled;
             }
             *self = self.moved(&tangent, &step);
             // Quadratic: the error left is the square of the step.
-            if length < resolution.max(1e-8) {
+            if length < resolution.max(1e-7) {
                 return Outcome::Converged;
             }
         }

@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::{Alignment, Gram};
 use super::motion::{Motion, Outcome};
-use crate::structure::{translation_direction, with_depths};
+use crate::structure::{Completed, translation_direction, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -53,9 +53,23 @@ impl Shortlist {
                 return;
             }
         }
+        self.append(kind, motion);
+    }
+
+    fn append(&mut self, kind: CandidateKind, motion: Motion) {
         if self.len < self.items.len() {
             self.items[self.len] = Some((kind, motion));
             self.len += 1;
+        }
+    }
+
+    /// Adds the two motions of an essential matrix.
+    fn push_pair(&mut self, motion: Motion) {
+        let before = self.len;
+        self.push(CandidateKind::Exact, motion);
+        // Either both rotations are there already, or neither.
+        if self.len > before {
+            self.append(CandidateKind::Exact, motion.twisted());
         }
     }
 
@@ -71,8 +85,7 @@ impl Shortlist {
         let mut motion = start;
         match motion.solve_five(alignment, matches) {
             Outcome::Converged => {
-                self.push(CandidateKind::Exact, motion);
-                self.push(CandidateKind::Exact, motion.twisted());
+                self.push_pair(motion);
                 Some(motion)
             }
             Outcome::Stalled => {
@@ -118,8 +131,8 @@ fn candidate(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Candidate {
-    let (pose, in_front) = with_depths(q_21, direction, matches);
-    Candidate { kind, pose, residual: pose.residual(matches), in_front }
+    let Completed { pose, in_front, residual } = with_depths(q_21, direction, matches);
+    Candidate { kind, pose, residual, in_front }
 }
 
 /// The rotation-only candidate: the best alignment, and the translation that fits it best.
