@@ -89,9 +89,8 @@ pub(crate) fn solve<const N: usize, const M: usize>(a: &mut [[f64; M]; N]) -> Op
                 pivot = i;
             }
         }
-        let row = a[pivot];
-        a[pivot] = a[k];
-        a[k] = row;
+        a.swap(k, pivot);
+        let row = a[k];
         let inverse = 1.0 / row[k];
         // Kept for the way back.
         x[k] = inverse;

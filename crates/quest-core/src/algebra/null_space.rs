@@ -93,6 +93,6 @@ mod tests {
         }
         a[4] = std::array::from_fn(|j| a[0][j] + a[1][j] - 2.0 * a[2][j]);
         assert!(null_space::<5, 9, 4>(&mut a).1 < 1e-15);
-        assert_eq!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1, 0.0);
+        assert!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1 <= 0.0);
     }
 }
