@@ -3,13 +3,18 @@
 mod aligned;
 mod cubics;
 mod essential;
+mod five_point;
+mod least_squares;
 mod motion;
+pub mod nister;
 pub mod quest;
 pub mod quest_eigen;
 mod shortlist;
+mod trace_cubics;
 
 use std::str::FromStr;
 
+pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
 
@@ -18,7 +23,7 @@ use crate::{Candidates, Correspondence};
 /// Which candidates a solver returns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kinds {
-    /// Every kind: real solutions, real parts of complex ones, and the rotation-only candidate.
+    /// Every kind that the solver has: real solutions, real parts of complex ones, the rotation-only candidate.
     #[default]
     All,
     /// The real solutions alone.
@@ -45,6 +50,8 @@ pub enum SolverName {
     Quest,
     /// [`QuestEigen`].
     QuestEigen,
+    /// [`Nister`].
+    Nister,
 }
 
 /// What the table of solvers says of one.
@@ -70,7 +77,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 2] = [Self::Quest, Self::QuestEigen];
+    pub const ALL: [Self; 3] = [Self::Quest, Self::QuestEigen, Self::Nister];
 
     /// The table's row.
     #[must_use]
@@ -88,6 +95,12 @@ impl SolverName {
                 max_candidates: 21,
                 reference: "Fathian et al., RAS 2018, section 7.1",
             },
+            Self::Nister => SolverInfo {
+                name: Nister::NAME,
+                min_matches: Nister::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Nistér, PAMI 2004",
+            },
         }
     }
 
@@ -96,6 +109,7 @@ impl SolverName {
         match self {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+            Self::Nister => Nister.solve(matches, out),
         }
     }
 }
