@@ -290,3 +290,4 @@ fn five_points() -> SceneOptions {
 }
 
 laws!(five_point nister: Subject { solver: SolverName::Nister, options: five_points(), most_lost: [3, 3], most_lost_of_more: 3, most_different: 20 });
+laws!(five_point stewenius: Subject { solver: SolverName::Stewenius, options: five_points(), most_lost: [1, 1], most_lost_of_more: 3, most_different: 20 });

@@ -8,18 +8,19 @@
 //! 4. Each gives two rotations and a translation, without refinement; scale, sign, depths, residuals and order as for
 //!    every solver.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
 
 use super::Kinds;
 use super::aligned::{Alignment, DEPENDENT, GRAM_DEPENDENT};
 use super::cubics::combine;
-use super::essential::decompose;
+use super::essential::{decompose, real_part, twisted};
 use super::least_squares::{outer, principal_basis};
 use super::motion::Motion;
 use super::shortlist::{Shortlist, pure_rotation};
 use super::trace_cubics::Basis;
 use crate::algebra::null_space;
 use crate::degeneracy::diagnose;
+use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// The smallest number of matches of every solver here.
@@ -42,7 +43,7 @@ pub(crate) fn solve(
     match null_space(matches) {
         Err(degeneracy) => out.set_degeneracy(degeneracy),
         Ok(basis) => {
-            let mut solutions = Solutions { basis, shortlist: Shortlist::new() };
+            let mut solutions = Solutions { basis, matches, shortlist: Shortlist::new() };
             if !method(&mut solutions) {
                 return out.set_degeneracy(Degeneracy::RankDeficient);
             }
@@ -66,19 +67,31 @@ fn null_space(matches: &[Correspondence]) -> Result<Basis, Degeneracy> {
 }
 
 /// The solutions found so far.
-pub(crate) struct Solutions {
+pub(crate) struct Solutions<'a> {
     /// The four essential matrices that solutions are combinations of.
     pub(crate) basis: Basis,
+    matches: &'a [Correspondence],
     shortlist: Shortlist,
 }
 
-impl Solutions {
+impl Solutions<'_> {
     /// Adds the two motions of the essential matrix `x E1 + y E2 + z E3 + w E4`.
     pub(crate) fn push_real(&mut self, point: &[f64; 4]) {
         let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
         let motion = Motion { q_21: unit(q), direction: Vector3::from(t).normalize() };
         self.shortlist.push(CandidateKind::Exact, motion);
         self.shortlist.push(CandidateKind::Exact, motion.twisted());
+    }
+
+    /// Adds the real parts of the two rotations of a complex essential matrix, each with the translation that fits
+    /// it best. One of a conjugate pair is enough.
+    pub(crate) fn push_complex(&mut self, point: &[Complex<f64>; 4]) {
+        let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
+        for q in [q, twisted(&q, &t)] {
+            let q_21 = unit(real_part(q));
+            let direction = translation_direction(&q_21, self.matches);
+            self.shortlist.push(CandidateKind::FromComplex, Motion { q_21, direction });
+        }
     }
 }
 

@@ -10,6 +10,7 @@ pub mod nister;
 pub mod quest;
 pub mod quest_eigen;
 mod shortlist;
+pub mod stewenius;
 mod trace_cubics;
 
 use std::str::FromStr;
@@ -17,6 +18,7 @@ use std::str::FromStr;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
 
@@ -52,6 +54,8 @@ pub enum SolverName {
     QuestEigen,
     /// [`Nister`].
     Nister,
+    /// [`Stewenius`].
+    Stewenius,
 }
 
 /// What the table of solvers says of one.
@@ -77,7 +81,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 3] = [Self::Quest, Self::QuestEigen, Self::Nister];
+    pub const ALL: [Self; 4] = [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius];
 
     /// The table's row.
     #[must_use]
@@ -101,6 +105,12 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Nistér, PAMI 2004",
             },
+            Self::Stewenius => SolverInfo {
+                name: Stewenius::NAME,
+                min_matches: Stewenius::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Stewénius, Engels, Nistér, ISPRS 2006",
+            },
         }
     }
 
@@ -110,6 +120,7 @@ impl SolverName {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
+            Self::Stewenius => Stewenius { kinds }.solve(matches, out),
         }
     }
 }
