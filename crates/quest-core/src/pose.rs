@@ -102,13 +102,10 @@ impl RelativePose {
     #[must_use]
     pub fn sampson_error(&self, m: &Correspondence) -> f64 {
         let (b, c) = (m.bearing2(), self.q_21 * m.bearing1());
-        let Some(t) = self.t_21.try_normalize(0.0) else {
-            return b.cross(&c).norm().atan2(b.dot(&c)) * std::f64::consts::FRAC_1_SQRT_2;
-        };
-        let e = t.dot(&b.cross(&c));
-        // The gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e.
-        let gradient2 = t.cross(&c).norm_squared() + t.cross(b).norm_squared() - 2.0 * e * e;
-        e.abs().atan2(gradient2.max(0.0).sqrt())
+        match self.t_21.try_normalize(0.0) {
+            Some(t) => sampson_square(t.dot(&b.cross(&c)), t.dot(b), t.dot(&c)).sqrt(),
+            None => b.cross(&c).norm().atan2(b.dot(&c)) * std::f64::consts::FRAC_1_SQRT_2,
+        }
     }
 
     /// Root mean square of [`sampson_error`](Self::sampson_error) over the matches, in radians.
@@ -117,4 +114,14 @@ impl RelativePose {
         let sum: f64 = matches.iter().map(|m| self.sampson_error(m).powi(2)).sum();
         (sum / matches.len().max(1) as f64).sqrt()
     }
+}
+
+/// The squared Sampson error of the constraint `e = t · (b × c)` of unit vectors, by `t · b` and `t · c`.
+#[inline]
+pub(crate) fn sampson_square(e: f64, tb: f64, tc: f64) -> f64 {
+    // The squared gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e; no
+    // bearing has to turn by more than a right angle.
+    const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+    let gradient2 = 2.0 - tb * tb - tc * tc - 2.0 * e * e;
+    (e * e / gradient2.max(f64::MIN_POSITIVE)).min(RIGHT_ANGLE * RIGHT_ANGLE)
 }

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::smallest_eigenvector_3;
-use crate::pose::PARALLEL;
+use crate::pose::{PARALLEL, sampson_square};
 use crate::{Correspondence, RelativePose};
 
 /// The direction of the translation that fits the rotation best: the eigenvector of `Σ n nᵀ` with the smallest
@@ -29,44 +29,59 @@ pub fn translation_direction(q_21: &UnitQuaternion<f64>, matches: &[Corresponden
     smallest_eigenvector_3(&sum).unwrap_or_else(Vector3::z)
 }
 
+/// A rotation and a direction of translation, completed by the scale, and what the matches say of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Completed {
+    /// The pose; the mean absolute depth over both views is 1.
+    pub pose: RelativePose,
+    /// The matches with positive depth in both views. Those whose rays are parallel to rounding have no depth and
+    /// count where the rays point the same way.
+    pub in_front: usize,
+    /// The residual; see [`RelativePose::residual`].
+    pub residual: f64,
+}
+
 /// The pose with rotation `q_21` and a translation along `direction` (a unit vector, of either sign): the sign
 /// puts more of the points in front of the cameras, the length makes the mean absolute depth 1.
 ///
-/// Returns the pose and the number of matches with positive depth in both views. Matches whose rays are
-/// parallel to rounding have no depth and count as in front where the rays point the same way. With no other
-/// matches the translation is zero.
+/// Where no match has a depth the translation is zero.
 #[must_use]
 pub fn with_depths(
     q_21: UnitQuaternion<f64>,
     direction: &Vector3<f64>,
     matches: &[Correspondence],
-) -> (RelativePose, usize) {
+) -> Completed {
     let r_21 = q_21.to_rotation_matrix();
     let (mut front, mut behind, mut at_infinity) = (0, 0, 0);
-    let (mut absolute, mut signed, mut count) = (0.0, 0.0, 0);
+    let (mut absolute, mut signed, mut squares, mut count) = (0.0, 0.0, 0.0, 0);
     for m in matches {
         let (b, c) = (m.bearing2(), r_21 * m.bearing1());
         let n = b.cross(&c);
         let nn = n.norm_squared();
+        let (tb, tc, bc) = (direction.dot(b), direction.dot(&c), b.dot(&c));
+        squares += sampson_square(direction.dot(&n), tb, tc);
         if nn <= PARALLEL * PARALLEL {
-            at_infinity += usize::from(b.dot(&c) > 0.0);
+            at_infinity += usize::from(bc > 0.0);
             continue;
         }
-        // Twice the signed areas: the ranges without their division, weighted by how well they are known.
-        let (area1, area2) = (-b.cross(direction).dot(&n), -c.cross(direction).dot(&n));
+        // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
+        let (area1, area2) = (bc * tb - tc, tb - bc * tc);
         front += usize::from(area1 > 0.0 && area2 > 0.0);
         behind += usize::from(area1 < 0.0 && area2 < 0.0);
         signed += area1 + area2;
-        absolute += (area1.abs() / m.length1() + area2.abs() / m.length2()) / nn;
+        let (length1, length2) = (m.length1(), m.length2());
         count += 2;
+        absolute += (area1.abs() * length2 + area2.abs() * length1) / (nn * length1 * length2);
     }
-    if count == 0 || absolute == 0.0 {
-        return (RelativePose::new(q_21, Vector3::zeros()), at_infinity);
+    let residual = (squares / matches.len().max(1) as f64).sqrt();
+    if absolute == 0.0 {
+        let pose = RelativePose::new(q_21, Vector3::zeros());
+        return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
     }
     let flip = behind > front || (behind == front && signed < 0.0);
     let length = f64::from(count) / absolute;
-    let t_21 = direction * if flip { -length } else { length };
-    (RelativePose::new(q_21, t_21), at_infinity + if flip { behind } else { front })
+    let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
+    Completed { pose, in_front: at_infinity + if flip { behind } else { front }, residual }
 }
 
 #[cfg(test)]
@@ -111,7 +126,7 @@ mod tests {
         for parallax in [1.0, 1e-2, 1e-4] {
             let (truth, matches) = planted(Vector3::new(0.5, -0.2, 0.3) * parallax);
             let direction = translation_direction(&truth.q_21, &matches);
-            let (pose, in_front) = with_depths(truth.q_21, &direction, &matches);
+            let Completed { pose, in_front, .. } = with_depths(truth.q_21, &direction, &matches);
             assert_eq!(in_front, 5);
             let null = null_vector_of_59(&truth.q_21, &matches);
             let scale = null[3..].iter().map(|z| z.abs()).sum::<f64>() / 10.0 * null[3].signum();
@@ -136,7 +151,7 @@ mod tests {
         let baseline = Vector3::new(0.5, -0.2, 0.3);
         let (truth, matches) = planted(baseline * 1e-2);
         let length = |truth: &RelativePose, matches: &[Correspondence]| {
-            with_depths(truth.q_21, &baseline.normalize(), matches).0.t_21.norm()
+            with_depths(truth.q_21, &baseline.normalize(), matches).pose.t_21.norm()
         };
         let reference = length(&truth, &matches) / 1e-2;
         for parallax in [1e-4, 1e-6, 1e-8] {
@@ -152,10 +167,11 @@ mod tests {
         let (truth, mut matches) = planted(Vector3::new(0.5, -0.2, 0.3));
         let a = Vector3::new(0.1, 0.2, 1.0);
         matches.push(Correspondence::from_bearings(a.into(), (truth.q_21 * a).into()).unwrap());
-        let (pose, in_front) = with_depths(truth.q_21, &truth.t_21.normalize(), &matches);
+        let Completed { pose, in_front, .. } = with_depths(truth.q_21, &truth.t_21.normalize(), &matches);
         assert_eq!((in_front, pose.depths(&matches[5])), (6, None));
         assert!(pose.t_21.norm() > 0.1);
-        let (pose, in_front) = with_depths(truth.q_21, &truth.t_21.normalize(), &matches[5..]);
+        let Completed { pose, in_front, .. } =
+            with_depths(truth.q_21, &truth.t_21.normalize(), &matches[5..]);
         assert_eq!((in_front, pose.t_21), (1, Vector3::zeros()));
     }
 }

@@ -77,32 +77,39 @@ pub(crate) fn null_vector<T: ComplexField<RealField = f64> + Copy, const N: usiz
     x.iter().all(ComplexField::is_finite).then_some(x)
 }
 
-/// Solves `a x = b` in place of `b`, with partial pivoting. `false` where `a` is singular.
-pub(crate) fn solve<const N: usize>(a: &mut [[f64; N]; N], b: &mut [f64; N]) -> bool {
+/// Solves the `N` equations in the rows of `a`, their right-hand sides in the last column (`M = N + 1`), with partial
+/// pivoting. `None` where they are singular. `a` is overwritten.
+pub(crate) fn solve<const N: usize, const M: usize>(a: &mut [[f64; M]; N]) -> Option<[f64; N]> {
+    const { assert!(M == N + 1) }
+    let mut x = [0.0; N];
     for k in 0..N {
-        let pivot = (k..N).fold(k, |best, i| if a[i][k].abs() > a[best][k].abs() { i } else { best });
-        let size = a[pivot][k].abs();
-        if size == 0.0 || !size.is_finite() {
-            return false;
+        let mut pivot = k;
+        for i in k + 1..N {
+            if a[i][k].abs() > a[pivot][k].abs() {
+                pivot = i;
+            }
         }
         a.swap(k, pivot);
-        b.swap(k, pivot);
-        let inverse = 1.0 / a[k][k];
-        for i in k + 1..N {
-            let factor = a[i][k] * inverse;
-            for j in k + 1..N {
-                a[i][j] -= factor * a[k][j];
+        let row = a[k];
+        let inverse = 1.0 / row[k];
+        // Kept for the way back.
+        x[k] = inverse;
+        for other in &mut a[k + 1..] {
+            // Whole rows: what stands left of column k is not read again, and a fixed length vectorises.
+            let factor = other[k] * inverse;
+            for j in 0..M {
+                other[j] -= factor * row[j];
             }
-            b[i] -= factor * b[k];
         }
     }
     for k in (0..N).rev() {
+        let mut sum = a[k][N];
         for j in k + 1..N {
-            b[k] -= a[k][j] * b[j];
+            sum -= a[k][j] * x[j];
         }
-        b[k] /= a[k][k];
+        x[k] *= sum;
     }
-    b.iter().all(|v| f64::is_finite(*v))
+    x.iter().all(ComplexField::is_finite).then_some(x)
 }
 
 #[cfg(test)]
@@ -156,14 +163,12 @@ mod tests {
     #[test]
     fn solve_agrees_with_nalgebra_and_refuses_singular() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut a: [[f64; 5]; 5] =
+        let mut a: [[f64; 6]; 5] =
             std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-        let mut b: [f64; 5] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
         let matrix = SMatrix::<f64, 5, 5>::from_fn(|i, j| a[i][j]);
-        let expected = matrix.lu().solve(&SVector::from(b)).unwrap();
-        assert!(solve(&mut a, &mut b));
-        assert!((SVector::from(b) - expected).norm() < 1e-12);
-        assert!(!solve(&mut [[1.0; 5]; 5], &mut b));
-        assert!(!solve(&mut [[f64::NAN; 5]; 5], &mut b));
+        let expected = matrix.lu().solve(&SVector::<f64, 5>::from_fn(|i, _| a[i][5])).unwrap();
+        assert!((SVector::from(solve(&mut a).unwrap()) - expected).norm() < 1e-12);
+        assert_eq!(solve(&mut [[1.0; 6]; 5]), None);
+        assert_eq!(solve(&mut [[f64::NAN; 6]; 5]), None);
     }
 }

@@ -22,36 +22,38 @@ pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
         let length = square.max(0.0).sqrt();
         smallest = smallest.min(length);
         largest = largest.max(length);
-        // The row becomes the reflection's vector v, with I − v vᵀ · inverse.
+        // The row becomes the reflection's vector v, with I − v vᵀ · inverse, zero ahead of entry k: loops of fixed length
+        // are worth more than the products with these zeros.
         let (head, tail) = a.split_at_mut(k + 1);
         let v = &mut head[k];
+        v[..k].fill(0.0);
         let image = -length.copysign(v[k]);
         let first = v[k] - image;
         v[k] = first;
         inverse[k] = if length > 0.0 { -1.0 / (image * first) } else { 0.0 };
         for row in tail {
-            reflect(row, v, inverse[k], k);
+            reflect(row, v, inverse[k]);
         }
     }
     let mut basis = [[0.0; C]; K];
     for (m, e) in basis.iter_mut().enumerate() {
         e[R + m] = 1.0;
         for k in (0..R).rev() {
-            reflect(e, &a[k], inverse[k], k);
+            reflect(e, &a[k], inverse[k]);
         }
     }
     (basis, if largest > 0.0 { smallest / largest } else { 0.0 })
 }
 
-/// Applies `I − v vᵀ · inverse`, where `v` starts at entry `k`.
+/// Applies `I − v vᵀ · inverse`.
 #[inline]
-fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64, k: usize) {
+fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64) {
     let mut dot = 0.0;
-    for j in k..C {
+    for j in 0..C {
         dot += v[j] * x[j];
     }
     dot *= inverse;
-    for j in k..C {
+    for j in 0..C {
         x[j] -= dot * v[j];
     }
 }
@@ -91,6 +93,6 @@ mod tests {
         }
         a[4] = std::array::from_fn(|j| a[0][j] + a[1][j] - 2.0 * a[2][j]);
         assert!(null_space::<5, 9, 4>(&mut a).1 < 1e-15);
-        assert_eq!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1, 0.0);
+        assert!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1 <= 0.0);
     }
 }

@@ -1,6 +1,7 @@
 //! The pose solvers, one file each, behind one small trait.
 
 mod aligned;
+mod consensus;
 mod cubics;
 mod essential;
 mod five_point;

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 use super::aligned::{Alignment, Gram};
 use crate::Correspondence;
 use crate::algebra::elimination;
+use crate::pose::sampson_square;
 
 /// A step shorter than this (radians) is rounding.
 const CONVERGED: f64 = 1e-13;
@@ -46,10 +47,11 @@ impl Motion {
 
     /// Whether two motions have the same essential matrix and rotation, to `tolerance` in radians. Both parts
     /// are needed: with little parallax all solutions have nearly the same rotation.
+    #[inline]
     pub(crate) fn is_close(&self, other: &Self, tolerance: f64) -> bool {
-        let cosine = self.q_21.coords.dot(&other.q_21.coords).abs();
-        self.direction.cross(&other.direction).norm() < tolerance
-            && (1.0 - cosine) < 0.125 * tolerance * tolerance + 4.0 * f64::EPSILON
+        let near = |cosine: f64, angle: f64| 1.0 - cosine * cosine < angle * angle + 4.0 * f64::EPSILON;
+        near(self.direction.dot(&other.direction), tolerance)
+            && near(self.q_21.coords.dot(&other.q_21.coords), 0.5 * tolerance)
     }
 
     /// The essential matrix `[t]× R`.
@@ -83,20 +85,20 @@ impl Motion {
         for _ in 0..MAX_NEWTON_STEPS {
             let tangent = tangent_basis(&self.direction);
             let r_21 = self.q_21.to_rotation_matrix();
-            let (mut jacobian, mut step) = ([[0.0; 5]; 5], [0.0; 5]);
+            let mut equations = [[0.0; 6]; 5];
             for (i, m) in matches.iter().enumerate() {
                 let row = Row::new(m.bearing2(), &(r_21 * m.bearing1()), &self.direction, &tangent);
-                jacobian[i] = row.gradient.into();
-                step[i] = -row.residual;
+                let [g0, g1, g2, g3, g4]: [f64; 5] = row.gradient.into();
+                equations[i] = [g0, g1, g2, g3, g4, -row.residual];
             }
-            let singular = !elimination::solve(&mut jacobian, &mut step);
+            let Some(step) = elimination::solve(&mut equations) else { return Outcome::Stalled };
             let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if singular || length > 1.0 {
+            if length > 1.0 {
                 return Outcome::Stalled;
             }
             *self = self.moved(&tangent, &step);
             // Quadratic: the error left is the square of the step.
-            if length < resolution.max(1e-8) {
+            if length < resolution.max(1e-7) {
                 return Outcome::Converged;
             }
         }
@@ -130,48 +132,68 @@ impl Motion {
         }
     }
 
-    /// Gauss–Newton on the Sampson errors of all matches, with their weights held in each step. Keeps the
-    /// start where it does not lead to a smaller residual.
-    pub(crate) fn minimise_sampson(&mut self, matches: &[Correspondence], max_steps: usize) {
-        let (mut best, mut trial, mut damping) = (f64::INFINITY, *self, 0.0);
+    /// Levenberg–Marquardt to a local minimum of the summed squares of the Sampson errors. Matches further than `cutoff`
+    /// (radians) from the epipolar constraint weigh nothing.
+    pub(crate) fn minimise_sampson(&mut self, matches: &[Correspondence], cutoff: f64, max_steps: usize) {
+        let mut damping = 0.0;
+        let mut current = self.sampson_equations(matches, cutoff);
         for _ in 0..max_steps {
-            let tangent = tangent_basis(&trial.direction);
-            let (cost, hessian, gradient) = trial.sampson_equations(matches, &tangent);
-            if cost < best {
-                (best, *self) = (cost, trial);
+            let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else { break };
+            let trial = self.moved(&current.tangent, &step.into());
+            let next = trial.sampson_equations(matches, cutoff);
+            let gain = current.cost - next.cost;
+            if gain > 0.0 {
+                (*self, current) = (trial, next);
                 damping *= 0.1;
             } else {
-                break;
+                damping = (10.0 * damping).max(1e-3);
             }
-            let Some(step) = damped_step(&hessian, &gradient, damping) else { break };
-            trial = trial.moved(&tangent, &step.into());
-            if step.norm() < CONVERGED {
+            if step.norm() < CONVERGED || damping > 1e3 || (0.0..1e-12 * current.cost).contains(&gain) {
                 break;
             }
         }
     }
 
-    /// The summed squares of the Sampson errors, and the normal equations of a step.
-    fn sampson_equations(
-        &self,
-        matches: &[Correspondence],
-        tangent: &[Vector3<f64>; 2],
-    ) -> (f64, Matrix5<f64>, Vector5<f64>) {
+    /// The sum of the squared Sampson errors, none of them counted beyond `cutoff`, and the equations of a step.
+    fn sampson_equations(&self, matches: &[Correspondence], cutoff: f64) -> Equations {
+        let tangent = tangent_basis(&self.direction);
         let r_21 = self.q_21.to_rotation_matrix();
         let (mut cost, mut hessian, mut gradient) = (0.0, Matrix5::zeros(), Vector5::zeros());
+        let limit = cutoff * cutoff;
         for m in matches {
             let (b, c) = (m.bearing2(), r_21 * m.bearing1());
-            let row = Row::new(b, &c, &self.direction, tangent);
-            let slope = self.direction.cross(&c).norm_squared() + self.direction.cross(b).norm_squared()
-                - 2.0 * row.residual * row.residual;
-            // At an epipole the constraint says nothing.
-            let weight = if slope > f64::EPSILON { 1.0 / slope } else { 0.0 };
-            cost += weight * row.residual * row.residual;
-            hessian += row.gradient * row.gradient.transpose() * weight;
-            gradient += row.gradient * (weight * row.residual);
+            let row = Row::new(b, &c, &self.direction, &tangent);
+            let (tb, tc) = (self.direction.dot(b), self.direction.dot(&c));
+            let square = sampson_square(row.residual, tb, tc);
+            cost += square.min(limit);
+            if square < limit && row.residual != 0.0 {
+                // r = e / √g with g = 2 − (t·b)² − (t·c)² − 2 e², so that
+                // dr = ((1 + 2 e²/g) de + (e/g) (t·b d(t·b) + t·c d(t·c))) / √g.
+                let over_g = square / (row.residual * row.residual);
+                let turned = c.cross(&self.direction) * tc;
+                let moved = b * tb + c * tc;
+                let [along1, along2] = tangent.map(|e| e.dot(&moved));
+                let bend = Vector5::new(turned.x, turned.y, turned.z, along1, along2);
+                let slope = row.gradient * (1.0 + 2.0 * square) + bend * (row.residual * over_g);
+                hessian += slope * slope.transpose() * over_g;
+                gradient += slope * (row.residual * over_g);
+            }
         }
-        (cost, hessian, gradient)
+        Equations { tangent, cost, hessian, gradient }
     }
+
+    /// The sum of the squared Sampson errors, none of them counted beyond `cutoff`.
+    pub(crate) fn truncated_cost(&self, matches: &[Correspondence], cutoff: f64) -> f64 {
+        self.sampson_equations(matches, cutoff).cost
+    }
+}
+
+/// The normal equations of a step from a motion.
+struct Equations {
+    tangent: [Vector3<f64>; 2],
+    cost: f64,
+    hessian: Matrix5<f64>,
+    gradient: Vector5<f64>,
 }
 
 /// The residual of one match and its derivative by the five parameters.
@@ -258,5 +280,23 @@ mod tests {
         let m = motion();
         assert!((m.essential() + m.twisted().essential()).norm() < 1e-15);
         assert!(m.is_close(&m.twisted().twisted(), 1e-12) && !m.is_close(&m.twisted(), 0.1));
+    }
+
+    #[test]
+    fn sampson_gradient_is_the_limit_of_differences() {
+        let m = motion();
+        let pairs = [([0.2, 0.5, 0.8], [-0.1, 0.4, 0.9]), ([-0.3, 0.1, 0.7], [0.5, -0.2, 0.6])];
+        let matches = pairs.map(|(a, b)| Correspondence::from_bearings(a, b).unwrap());
+        let at = |m: &Motion| m.sampson_equations(&matches, f64::INFINITY);
+        let h = 1e-6;
+        for k in 0..5 {
+            let mut step = [0.0; 5];
+            step[k] = h;
+            let plus = at(&m.moved(&at(&m).tangent, &step)).cost;
+            step[k] = -h;
+            let minus = at(&m.moved(&at(&m).tangent, &step)).cost;
+            // Half the gradient of the squares; h² of truncation, ε / h of rounding.
+            assert!((at(&m).gradient[k] - (plus - minus) / (4.0 * h)).abs() < 1e-9);
+        }
     }
 }

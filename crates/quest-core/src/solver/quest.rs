@@ -15,7 +15,7 @@
 //! 6. Translation and depths with one scale: [`structure`](crate::structure).
 //!
 //! For more matches the null space is that of all rows in the least-squares sense, and every solution is refined over
-//! all matches.
+//! all matches. Where none fits, the motion on which most matches agree is added (`consensus.rs`).
 //!
 //! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points).
 //! **Solutions**: at most ten essential matrices, twenty rotations, and the rotation-only candidate.
@@ -29,7 +29,7 @@ use super::cubics::{Resultant, combine};
 use super::essential::{decompose, real_part, twisted};
 use super::motion::Motion;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver};
+use super::{Kinds, PoseSolver, consensus};
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -111,7 +111,18 @@ fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortl
         let direction = translation_direction(&q_21, matches);
         starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
     });
-    Ok(starts.refined(&gram, matches))
+    let mut refined = starts.refined(&gram, matches);
+    consensus::add(&mut refined, matches, motions_of_five);
+    Ok(refined)
+}
+
+/// The exact motions of five matches on their own.
+pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist> {
+    let alignment = Alignment::new(matches);
+    if alignment.is_pure_rotation() {
+        return None;
+    }
+    from_five(Kinds::Exact, &alignment, matches).ok()
 }
 
 /// An elimination that comes this close to singular has lost half of its digits.

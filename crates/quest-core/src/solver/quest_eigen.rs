@@ -28,8 +28,9 @@ use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 use super::aligned::{Alignment, Gram};
 use super::essential::real_part;
 use super::motion::Motion;
+use super::quest::motions_of_five;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver};
+use super::{Kinds, PoseSolver, consensus};
 use crate::algebra::monomials::position;
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
@@ -107,7 +108,9 @@ fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortl
             }
         }
     }
-    Ok(starts.refined(&gram, matches))
+    let mut refined = starts.refined(&gram, matches);
+    consensus::add(&mut refined, matches, motions_of_five);
+    Ok(refined)
 }
 
 fn pre_rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {

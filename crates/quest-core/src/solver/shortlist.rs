@@ -5,11 +5,14 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::{Alignment, Gram};
 use super::motion::{Motion, Outcome};
-use crate::structure::{translation_direction, with_depths};
+use crate::structure::{Completed, translation_direction, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
 const SAME: f64 = 1e-6;
+
+/// The same for local minima over many matches, which no two of a different origin reach in the same place.
+const SAME_MINIMUM: f64 = 1e-3;
 
 /// Residuals below this are zero: rounding, not quality, and must not decide the order.
 const ROUNDING: f64 = 1e-12;
@@ -19,11 +22,13 @@ const ROUNDING: f64 = 1e-12;
 pub(crate) struct Shortlist {
     items: [Option<(CandidateKind, Motion)>; Candidates::CAPACITY],
     len: usize,
+    /// Motions closer than this are one.
+    same: f64,
 }
 
 impl Shortlist {
     pub(crate) fn new() -> Self {
-        Self { items: [None; Candidates::CAPACITY], len: 0 }
+        Self { items: [None; Candidates::CAPACITY], len: 0, same: SAME }
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &(CandidateKind, Motion)> {
@@ -46,16 +51,30 @@ impl Shortlist {
     /// Adds a motion unless it is there already. A duplicate counts as exact if either of the two is.
     pub(crate) fn push(&mut self, kind: CandidateKind, motion: Motion) {
         for (other_kind, other) in self.items[..self.len].iter_mut().flatten() {
-            if other.is_close(&motion, SAME) {
+            if other.is_close(&motion, self.same) {
                 if kind == CandidateKind::Exact && *other_kind != CandidateKind::Exact {
                     (*other_kind, *other) = (kind, motion);
                 }
                 return;
             }
         }
+        self.append(kind, motion);
+    }
+
+    fn append(&mut self, kind: CandidateKind, motion: Motion) {
         if self.len < self.items.len() {
             self.items[self.len] = Some((kind, motion));
             self.len += 1;
+        }
+    }
+
+    /// Adds the two motions of an essential matrix.
+    pub(crate) fn push_pair(&mut self, kind: CandidateKind, motion: Motion) {
+        let before = self.len;
+        self.push(kind, motion);
+        // Either both rotations are there already, or neither.
+        if self.len > before {
+            self.append(kind, motion.twisted());
         }
     }
 
@@ -71,8 +90,7 @@ impl Shortlist {
         let mut motion = start;
         match motion.solve_five(alignment, matches) {
             Outcome::Converged => {
-                self.push(CandidateKind::Exact, motion);
-                self.push(CandidateKind::Exact, motion.twisted());
+                self.push_pair(CandidateKind::Exact, motion);
                 Some(motion)
             }
             Outcome::Stalled => {
@@ -88,16 +106,26 @@ impl Shortlist {
         for (kind, motion) in self.iter() {
             let mut motion = *motion;
             motion.minimise_gram(gram, 30);
-            coarse.push(*kind, motion);
-            coarse.push(*kind, motion.twisted());
+            // Twisted partners have the same errors.
+            if !coarse.contains(&motion.twisted()) {
+                coarse.push(*kind, motion);
+            }
         }
-        let mut fine = Self::new();
+        // Of two that end in the same place the better one is to stay.
+        let cost =
+            |item: &Option<(CandidateKind, Motion)>| item.map_or(0.0, |(_, motion)| gram.cost(&motion));
+        coarse.items[..coarse.len].sort_unstable_by(|x, y| cost(x).total_cmp(&cost(y)));
+        let mut fine = Self { same: SAME_MINIMUM, ..Self::new() };
         for (kind, motion) in coarse.iter() {
             let mut motion = *motion;
-            motion.minimise_sampson(matches, 10);
-            fine.push(*kind, motion);
+            motion.minimise_sampson(matches, f64::INFINITY, 30);
+            fine.push_pair(*kind, motion);
         }
         fine
+    }
+
+    fn contains(&self, motion: &Motion) -> bool {
+        self.iter().any(|(_, other)| other.is_close(motion, self.same))
     }
 
     /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
@@ -118,8 +146,8 @@ fn candidate(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Candidate {
-    let (pose, in_front) = with_depths(q_21, direction, matches);
-    Candidate { kind, pose, residual: pose.residual(matches), in_front }
+    let Completed { pose, in_front, residual } = with_depths(q_21, direction, matches);
+    Candidate { kind, pose, residual, in_front }
 }
 
 /// The rotation-only candidate: the best alignment, and the translation that fits it best.

@@ -1,0 +1,52 @@
+//! One more candidate where the matches cannot all be correct: that of the five that most of the others agree with.
+//!
+//! The solvers take matches to be correct, and fit all of them. A few false ones among ten or twenty then spoil every
+//! candidate. Where no candidate fits, some fives of the matches are solved as well, and the motion with the
+//! smallest truncated error is refined over the matches that agree with it. It is a help against an accident, not
+//! a robust estimator: with a third of the matches false it finds the true motion in nine of ten cases.
+
+use rand::seq::index::sample_array;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::motion::Motion;
+use super::shortlist::Shortlist;
+use crate::{CandidateKind, Correspondence};
+
+/// No correct match is further than this from its epipolar plane: four pixels at a focal length of a thousand.
+const AGREEMENT: f64 = 4e-3;
+
+/// How many fives are tried. With 70 % correct matches one of them is all correct in 99 of 100 cases.
+const FIVES: usize = 24;
+
+/// Adds the motion on which most matches agree, if no motion in the list fits them all. `solve` gives the motions of
+/// five matches.
+pub(crate) fn add(
+    shortlist: &mut Shortlist,
+    matches: &[Correspondence],
+    solve: impl Fn(&[Correspondence; 5]) -> Option<Shortlist>,
+) {
+    let cost = |motion: &Motion| motion.truncated_cost(matches, AGREEMENT);
+    let untruncated = |motion: &Motion| motion.truncated_cost(matches, f64::INFINITY);
+    let all_agree = matches.len() as f64 * AGREEMENT * AGREEMENT;
+    if shortlist.iter().any(|(_, motion)| untruncated(motion) < all_agree) {
+        return;
+    }
+    // The same fives for the same matches, every time.
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut best: Option<(f64, Motion)> = None;
+    for _ in 0..FIVES {
+        let Some(indices) = sample_array::<_, 5>(&mut rng, matches.len()) else { return };
+        let five = indices.map(|index| matches[index]);
+        for (_, motion) in solve(&five).iter().flat_map(Shortlist::iter) {
+            let cost = cost(motion);
+            if best.is_none_or(|(smallest, _)| cost < smallest) {
+                best = Some((cost, *motion));
+            }
+        }
+    }
+    if let Some((_, mut motion)) = best {
+        motion.minimise_sampson(matches, AGREEMENT, 30);
+        shortlist.push_pair(CandidateKind::Exact, motion);
+    }
+}
