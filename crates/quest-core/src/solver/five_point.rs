@@ -79,8 +79,7 @@ impl Solutions<'_> {
     pub(crate) fn push_real(&mut self, point: &[f64; 4]) {
         let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
         let motion = Motion { q_21: unit(q), direction: Vector3::from(t).normalize() };
-        self.shortlist.push(CandidateKind::Exact, motion);
-        self.shortlist.push(CandidateKind::Exact, motion.twisted());
+        self.shortlist.push_pair(CandidateKind::Exact, motion);
     }
 
     /// Adds the real parts of the two rotations of a complex essential matrix, each with the translation that fits
