@@ -99,7 +99,8 @@ fn rows<T: Copy>(e: &[T; 9]) -> [[T; 3]; 3] {
     [[e[0], e[1], e[2]], [e[3], e[4], e[5]], [e[6], e[7], e[8]]]
 }
 
+/// The rotation of a quaternion of any scale.
 #[inline]
-fn unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+pub(crate) fn unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }

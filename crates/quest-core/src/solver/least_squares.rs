@@ -1,6 +1,9 @@
 //! The least-squares null space of any number of rows of nine.
 
-use nalgebra::{SMatrix, SymmetricEigen};
+use nalgebra::{SMatrix, SymmetricEigen, Vector3};
+
+use super::aligned::{DEPENDENT, GRAM_DEPENDENT};
+use crate::algebra::null_space::null_space;
 
 /// An orthonormal basis of the nine coordinates, those that the rows constrain most first, and the sums of squares that the
 /// rows leave of each.
@@ -24,9 +27,23 @@ pub(crate) fn principal_basis(rows: impl Iterator<Item = [f64; 9]>) -> ([f64; 9]
     (order.map(|k| eigen.eigenvalues[k]), basis)
 }
 
+/// The unit vector that at least eight rows leave the smallest sum of squares; `None` where they leave more than one.
+pub(crate) fn null_vector(count: usize, rows: impl Iterator<Item = [f64; 9]>) -> Option<[f64; 9]> {
+    if count == 8 {
+        let mut eight = [[0.0; 9]; 8];
+        for (row, given) in eight.iter_mut().zip(rows) {
+            *row = given;
+        }
+        let ([vector], pivot) = null_space(&mut eight);
+        return (pivot > DEPENDENT).then_some(vector);
+    }
+    let (squares, [.., vector]) = principal_basis(rows);
+    (squares[7] > GRAM_DEPENDENT * squares[0]).then_some(vector)
+}
+
 /// The row of nine products `u_i v_j` of the bilinear form `uᵀ X v` in the entries of `X`, row by row.
 #[inline]
-pub(crate) fn outer(u: &nalgebra::Vector3<f64>, v: &nalgebra::Vector3<f64>) -> [f64; 9] {
+pub(crate) fn outer(u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 9] {
     [u.x * v.x, u.x * v.y, u.x * v.z, u.y * v.x, u.y * v.y, u.y * v.z, u.z * v.x, u.z * v.y, u.z * v.z]
 }
 

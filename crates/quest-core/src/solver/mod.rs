@@ -3,11 +3,14 @@
 mod aligned;
 mod consensus;
 mod cubics;
+pub mod eight_point;
 mod essential;
 mod five_point;
+pub mod homography;
 mod least_squares;
 mod motion;
 pub mod nister;
+mod normalisation;
 pub mod quest;
 pub mod quest_eigen;
 mod shortlist;
@@ -16,6 +19,8 @@ mod trace_cubics;
 
 use std::str::FromStr;
 
+pub use eight_point::EightPoint;
+pub use homography::Homography;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
@@ -57,6 +62,10 @@ pub enum SolverName {
     Nister,
     /// [`Stewenius`].
     Stewenius,
+    /// [`Homography`].
+    Homography,
+    /// [`EightPoint`].
+    EightPoint,
 }
 
 /// What the table of solvers says of one.
@@ -82,7 +91,8 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 4] = [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius];
+    pub const ALL: [Self; 6] =
+        [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius, Self::Homography, Self::EightPoint];
 
     /// The table's row.
     #[must_use]
@@ -112,6 +122,18 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Stewénius, Engels, Nistér, ISPRS 2006",
             },
+            Self::Homography => SolverInfo {
+                name: Homography::NAME,
+                min_matches: Homography::MIN_MATCHES,
+                max_candidates: 4,
+                reference: "Ma, Soatto, Košecká, Sastry, 2004, section 5.3",
+            },
+            Self::EightPoint => SolverInfo {
+                name: EightPoint::NAME,
+                min_matches: EightPoint::MIN_MATCHES,
+                max_candidates: 2,
+                reference: "Hartley, PAMI 1997",
+            },
         }
     }
 
@@ -122,6 +144,8 @@ impl SolverName {
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
+            Self::Homography => Homography.solve(matches, out),
+            Self::EightPoint => EightPoint.solve(matches, out),
         }
     }
 }
