@@ -10,6 +10,10 @@ use nalgebra::Complex;
 /// Where bisection gives up on telling two roots apart, in halvings of an interval.
 const MAX_DEPTH: u32 = 45;
 
+/// Where the line is first divided. None of these is a likely root, as zero is where a basis vector is itself a
+/// solution: there rounding decides the sign.
+const SPLITS: [f64; 3] = [-0.93, 0.07, 1.11];
+
 /// The real roots that were found.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RealRoots<const N: usize> {
@@ -39,17 +43,16 @@ pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {
         roots.certain = false;
         return roots;
     };
-    let at = |x: f64| End { x, changes: chain.sign_changes(x) };
-    let (minus_one, zero, one) = (at(-1.0), at(0.0), at(1.0));
-    let below = chain.bound(-1.0, minus_one.changes);
-    let above = chain.bound(1.0, one.changes);
-    if let Some(below) = below {
-        chain.isolate(below, minus_one, MAX_DEPTH, &mut roots);
+    let ends = SPLITS.map(|x| End { x, changes: chain.sign_changes(x) });
+    let [first, .., last] = ends;
+    if let Some(below) = chain.bound(-1.0, first) {
+        chain.isolate(below, first, MAX_DEPTH, &mut roots);
     }
-    chain.isolate(minus_one, zero, MAX_DEPTH, &mut roots);
-    chain.isolate(zero, one, MAX_DEPTH, &mut roots);
-    if let Some(above) = above {
-        chain.isolate(one, above, MAX_DEPTH, &mut roots);
+    for pair in ends.windows(2) {
+        chain.isolate(pair[0], pair[1], MAX_DEPTH, &mut roots);
+    }
+    if let Some(above) = chain.bound(1.0, last) {
+        chain.isolate(last, above, MAX_DEPTH, &mut roots);
     }
     roots
 }
@@ -126,31 +129,33 @@ impl<const N: usize> Chain<N> {
         changes
     }
 
-    /// A point beyond all roots on the side of `unit`, with `changes` at `unit`; `None` where there are none.
-    fn bound(&self, unit: f64, changes: u32) -> Option<End> {
+    /// A point beyond all roots on the side of `direction` (±1) from `end`; `None` where there are none.
+    fn bound(&self, direction: f64, end: End) -> Option<End> {
         // At ±∞ the leading terms decide: x, and the slopes of the recurrence.
-        let mut at_infinity = u32::from((self.last_linear[1] * unit < 0.0) != (self.last < 0.0));
+        let mut at_infinity = u32::from((self.last_linear[1] * direction < 0.0) != (self.last < 0.0));
         for [_, slope, _] in &self.links[..N - 2] {
-            at_infinity += u32::from(slope * unit < 0.0);
+            at_infinity += u32::from(slope * direction < 0.0);
         }
-        let mut x = unit;
-        let mut at_x = changes;
-        while at_x != at_infinity {
-            x *= 4.0;
-            at_x = self.sign_changes(x);
+        let mut bound = end;
+        while bound.changes != at_infinity {
+            bound.x = 4.0 * bound.x.abs().max(1.0) * direction;
+            bound.changes = self.sign_changes(bound.x);
             // A root this far out is one at infinity, of a polynomial of lower degree.
-            if x.abs() > 1e12 {
+            if bound.x.abs() > 1e12 {
                 break;
             }
         }
-        (at_x != changes).then_some(End { x, changes: at_x })
+        (bound.changes != end.changes).then_some(bound)
     }
 
     fn isolate(&self, from: End, to: End, depth: u32, roots: &mut RealRoots<N>) {
         let count = from.changes.saturating_sub(to.changes);
         match count {
             0 => {}
-            1 => roots.push(self.refine(from.x, to.x)),
+            1 => match self.refine(from.x, to.x) {
+                Some(root) => roots.push(root),
+                None => roots.certain = false,
+            },
             _ if depth == 0 => {
                 roots.certain = false;
                 for _ in 0..count {
@@ -167,8 +172,12 @@ impl<const N: usize> Chain<N> {
     }
 
     /// The one root in an interval: Newton's iteration, bisection where it would leave the bracket.
-    fn refine(&self, mut low: f64, mut high: f64) -> f64 {
+    /// `None` where there is none, rounding having decided a count.
+    fn refine(&self, mut low: f64, mut high: f64) -> Option<f64> {
         let negative_below = value_and_slope(&self.p, low).0 < 0.0;
+        if negative_below == (value_and_slope(&self.p, high).0 < 0.0) {
+            return None;
+        }
         let mut x = 0.5 * (low + high);
         for _ in 0..80 {
             let (value, slope) = value_and_slope(&self.p, x);
@@ -185,10 +194,10 @@ impl<const N: usize> Chain<N> {
             if moved <= 1e-9 * (1e-3 + x.abs()) {
                 let (value, slope) = value_and_slope(&self.p, x);
                 let last = x - value / slope;
-                return if last.is_finite() && (last - x).abs() <= moved { last } else { x };
+                return Some(if last.is_finite() && (last - x).abs() <= moved { last } else { x });
             }
         }
-        x
+        Some(x)
     }
 }
 
@@ -224,10 +233,9 @@ pub(crate) fn complex_roots<const N: usize>(
         degree -= 2;
         let polished = newton_step(p, newton_step(p, root));
         let polished = if polished.re.is_finite() && polished.im.is_finite() { polished } else { root };
-        if polished.im != 0.0 {
-            out[found] = Complex::new(polished.re, polished.im.abs());
-            found += 1;
-        }
+        // A double root, or two real ones that the chain did not tell apart, comes out with next to no imaginary part.
+        out[found] = Complex::new(polished.re, polished.im.abs());
+        found += 1;
     }
     found
 }

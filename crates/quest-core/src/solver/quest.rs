@@ -83,9 +83,13 @@ fn from_five(
         let roots = Roots::new(&basis, alignment);
         let complete = roots.real(|motion| shortlist.push_solution(motion, alignment, matches).is_some());
         if kinds == Kinds::All {
-            roots.complex(|q_21| {
-                let direction = translation_direction(&q_21, matches);
-                shortlist.push(CandidateKind::FromComplex, Motion { q_21, direction });
+            roots.complex(|q_21, nearly_real| {
+                let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
+                if nearly_real {
+                    shortlist.push_solution(motion, alignment, matches);
+                } else {
+                    shortlist.push(CandidateKind::FromComplex, motion);
+                }
             });
         }
         // Every real root is an essential matrix of its own.
@@ -100,17 +104,23 @@ fn from_five(
 /// The local minima over more than five matches.
 fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
     let gram = Gram::new(alignment, matches);
-    let [_, _, _, _, _, basis @ ..] = gram.principal_basis(matches)?;
-    let roots = Roots::new(&basis, alignment);
+    let [_, _, _, _, _, mut basis @ ..] = gram.principal_basis(matches)?;
     let mut starts = Shortlist::new();
-    roots.real(|motion| {
-        starts.push(CandidateKind::Exact, motion);
-        true
-    });
-    roots.complex(|q_21| {
-        let direction = translation_direction(&q_21, matches);
-        starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
-    });
+    for mixing in MIXINGS {
+        let roots = Roots::new(&basis, alignment);
+        let complete = roots.real(|motion| {
+            starts.push(CandidateKind::Exact, motion);
+            true
+        });
+        roots.complex(|q_21, _| {
+            let direction = translation_direction(&q_21, matches);
+            starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
+        });
+        if complete {
+            break;
+        }
+        basis = mixed(&basis, &mixing);
+    }
     let mut refined = starts.refined(&gram, matches);
     consensus::add(&mut refined, matches, motions_of_five);
     Ok(refined)
@@ -124,6 +134,9 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
     }
     from_five(Kinds::Exact, &alignment, matches).ok()
 }
+
+/// A double root is known to the square root of rounding; times what the elimination loses.
+const NEARLY_REAL: f64 = 1e-4;
 
 /// An elimination that comes this close to singular has lost half of its digits.
 const SMALL_PIVOT: f64 = 1e-8;
@@ -172,15 +185,16 @@ impl<'a> Roots<'a> {
         complete
     }
 
-    /// Hands over the real parts of both rotations of each complex pair of roots.
-    fn complex(&self, mut accept: impl FnMut(UnitQuaternion<f64>)) {
+    /// Hands over the real parts of both rotations of each complex pair of roots, and whether the pair may be two real
+    /// ones that rounding has joined.
+    fn complex(&self, mut accept: impl FnMut(UnitQuaternion<f64>, bool)) {
         let mut roots = [Complex::from(0.0); 11];
         let count = complex_roots(&self.polynomial, self.real.as_slice(), &mut roots);
         for &z in &roots[..count] {
             let coordinates = combine(self.basis, &self.resultant.point(z));
             let Some((q, t)) = decompose(&self.alignment.essential(&coordinates)) else { continue };
             for q in [q, twisted(&q, &t)] {
-                accept(unit(real_part(q)) * self.alignment.q0_21);
+                accept(unit(real_part(q)) * self.alignment.q0_21, z.im < NEARLY_REAL * (1.0 + z.re.abs()));
             }
         }
     }
