@@ -39,9 +39,9 @@ pub enum Degeneracy {
     Coincident,
     /// Matches are repeated, and too few distinct ones are left.
     Duplicate,
-    /// Four or more of five points lie on a line.
+    /// All points, or all but one, lie on a line.
     Collinear,
-    /// The matches give fewer than five independent constraints, for another reason than those above.
+    /// The matches give fewer independent constraints than the solver needs, for another reason than those above.
     RankDeficient,
     /// A rotation alone explains the matches to the last digit: there is no translation, and no depth is
     /// determined. The candidate holds the rotation and `t = 0`.

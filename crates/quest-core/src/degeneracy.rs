@@ -17,6 +17,11 @@ pub(crate) fn all_parallel(matches: &[Correspondence]) -> bool {
 /// Names the reason why matches give fewer than five independent constraints. Quadratic in their number; called only
 /// when the constraints have been found short.
 pub(crate) fn diagnose(matches: &[Correspondence]) -> Degeneracy {
+    diagnose_fewer_than(5, matches)
+}
+
+/// The same for a solver that needs another number of distinct matches.
+pub(crate) fn diagnose_fewer_than(needed: usize, matches: &[Correspondence]) -> Degeneracy {
     let same = |x: &Vector3<f64>, y: &Vector3<f64>| (x - y).norm() < SAME;
     let coincident = |bearing: fn(&Correspondence) -> &Vector3<f64>| {
         matches.iter().all(|m| same(bearing(m), bearing(&matches[0])))
@@ -31,7 +36,7 @@ pub(crate) fn diagnose(matches: &[Correspondence]) -> Degeneracy {
         matches[..i].iter().any(twin)
     };
     let distinct = (0..matches.len()).filter(|&i| !repeated(i)).count();
-    if distinct < 5 {
+    if distinct < needed {
         return Degeneracy::Duplicate;
     }
     let leave_out = |skip: usize| matches.iter().enumerate().filter(move |(i, _)| *i != skip).map(|(_, m)| m);

@@ -27,10 +27,10 @@ const NO_PARALLAX: f64 = 1e-13;
 
 /// Constraints closer to dependent than this have no reliable solution: the smallest pivot of the
 /// rows is at most 1e-15 for collinear, coincident and repeated points, and above 1e-4 for ordinary ones.
-const DEPENDENT: f64 = 1e-11;
+pub(crate) const DEPENDENT: f64 = 1e-11;
 
 /// What [`DEPENDENT`] becomes for the eigenvalues of the Gram matrix, where rounding is.
-const GRAM_DEPENDENT: f64 = 1e-14;
+pub(crate) const GRAM_DEPENDENT: f64 = 1e-14;
 
 /// Coordinates `(t, S11, S22, S33, S12, S13, S23)` of an essential matrix `[t]× + p S`.
 pub(crate) type Coordinates = [f64; 9];
@@ -66,6 +66,19 @@ impl Alignment {
         };
         let sum: f64 = matches.iter().map(square).sum();
         Self { q0_21, parallax: (sum / matches.len() as f64).sqrt() }
+    }
+
+    /// The alignment of matches that a rotation alone explains. It preserves the angles between bearings, which
+    /// rules out most matches at little cost.
+    pub(crate) fn of_pure_rotation(matches: &[Correspondence]) -> Option<Self> {
+        let (first, rest) = matches.split_first()?;
+        // No bearing is off by more than all are in root sum of squares; two of them make an angle.
+        let tolerance = 2.0 * NO_PARALLAX * (matches.len() as f64).sqrt();
+        let angle_is_kept = |m: &Correspondence| {
+            let cosine1 = first.bearing1().dot(m.bearing1()).abs();
+            (cosine1 - first.bearing2().dot(m.bearing2()).abs()).abs() <= tolerance
+        };
+        rest.iter().all(angle_is_kept).then(|| Self::new(matches)).filter(Self::is_pure_rotation)
     }
 
     /// Whether a rotation alone explains the matches to the last digit.

@@ -33,7 +33,7 @@ const QUADRATIC: [[u8; 4]; 10] = homogeneous::<10>(2);
 
 /// Exponents of the twenty cubic monomials: ten to eliminate, the rest with `x`, with `y` and with neither, by falling
 /// powers of `z`.
-const CUBIC: [[u8; 4]; 20] = [
+pub(crate) const CUBIC: [[u8; 4]; 20] = [
     [3, 0, 0, 0],
     [0, 3, 0, 0],
     [2, 1, 0, 0],
@@ -83,12 +83,12 @@ const PRODUCT: [[usize; 4]; 10] = {
     table
 };
 
-type Linear = [f64; 4];
-type Quadratic = [f64; 10];
-type Cubic = [f64; 20];
+pub(crate) type Linear = [f64; 4];
+pub(crate) type Quadratic = [f64; 10];
+pub(crate) type Cubic = [f64; 20];
 
 #[inline]
-fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
+pub(crate) fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
     for i in 0..4 {
         for j in 0..4 {
             out[SQUARE[i][j]] += a[i] * b[j];
@@ -97,7 +97,7 @@ fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
 }
 
 #[inline]
-fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
+pub(crate) fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
     for i in 0..10 {
         for j in 0..4 {
             out[PRODUCT[i][j]] += a[i] * b[j];
@@ -106,7 +106,7 @@ fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
 }
 
 #[inline]
-fn scaled(a: &Linear, factor: f64) -> Linear {
+pub(crate) fn scaled(a: &Linear, factor: f64) -> Linear {
     a.map(|x| factor * x)
 }
 
@@ -225,7 +225,12 @@ pub(crate) struct Resultant {
 impl Resultant {
     /// The three equations, and how far the elimination was from singular.
     pub(crate) fn new(basis: &[Coordinates; 4], p: f64) -> (Self, f64) {
-        let mut cubics = ten_cubics(basis, p);
+        Self::from_cubics(ten_cubics(basis, p))
+    }
+
+    /// The same for any ten cubics over [`CUBIC`] of an essential matrix.
+    #[inline]
+    pub(crate) fn from_cubics(mut cubics: [Cubic; 10]) -> (Self, f64) {
         let pivot = elimination::reduce(&mut cubics, FIRST_USED);
         let mut out = Self { x: [[0.0; 4]; 3], y: [[0.0; 4]; 3], w: [[0.0; 5]; 3] };
         for r in 0..3 {

@@ -3,23 +3,35 @@
 mod aligned;
 mod consensus;
 mod cubics;
+pub mod eight_point;
 mod essential;
+mod five_point;
+pub mod homography;
+mod least_squares;
 mod motion;
+pub mod nister;
+mod normalisation;
 pub mod quest;
 pub mod quest_eigen;
 mod shortlist;
+pub mod stewenius;
+mod trace_cubics;
 
 use std::str::FromStr;
 
+pub use eight_point::EightPoint;
+pub use homography::Homography;
+pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
 
 /// Which candidates a solver returns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kinds {
-    /// Every kind: real solutions, real parts of complex ones, and the rotation-only candidate.
+    /// Every kind that the solver has: real solutions, real parts of complex ones, the rotation-only candidate.
     #[default]
     All,
     /// The real solutions alone.
@@ -46,6 +58,14 @@ pub enum SolverName {
     Quest,
     /// [`QuestEigen`].
     QuestEigen,
+    /// [`Nister`].
+    Nister,
+    /// [`Stewenius`].
+    Stewenius,
+    /// [`Homography`].
+    Homography,
+    /// [`EightPoint`].
+    EightPoint,
 }
 
 /// What the table of solvers says of one.
@@ -71,7 +91,8 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 2] = [Self::Quest, Self::QuestEigen];
+    pub const ALL: [Self; 6] =
+        [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius, Self::Homography, Self::EightPoint];
 
     /// The table's row.
     #[must_use]
@@ -89,6 +110,30 @@ impl SolverName {
                 max_candidates: 21,
                 reference: "Fathian et al., RAS 2018, section 7.1",
             },
+            Self::Nister => SolverInfo {
+                name: Nister::NAME,
+                min_matches: Nister::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Nistér, PAMI 2004",
+            },
+            Self::Stewenius => SolverInfo {
+                name: Stewenius::NAME,
+                min_matches: Stewenius::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Stewénius, Engels, Nistér, ISPRS 2006",
+            },
+            Self::Homography => SolverInfo {
+                name: Homography::NAME,
+                min_matches: Homography::MIN_MATCHES,
+                max_candidates: 4,
+                reference: "Ma, Soatto, Košecká, Sastry, 2004, section 5.3",
+            },
+            Self::EightPoint => SolverInfo {
+                name: EightPoint::NAME,
+                min_matches: EightPoint::MIN_MATCHES,
+                max_candidates: 2,
+                reference: "Hartley, PAMI 1997",
+            },
         }
     }
 
@@ -97,6 +142,10 @@ impl SolverName {
         match self {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+            Self::Nister => Nister.solve(matches, out),
+            Self::Stewenius => Stewenius { kinds }.solve(matches, out),
+            Self::Homography => Homography.solve(matches, out),
+            Self::EightPoint => EightPoint.solve(matches, out),
         }
     }
 }
