@@ -12,3 +12,8 @@ pub mod polynomial;
 pub mod quartics;
 pub mod scenes;
 pub mod solution_sets;
+
+/// The example in Rust of the root's README.md, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub mod readme {}

@@ -32,6 +32,15 @@ def test_readme(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.startswith("exact True [ 0.9985")
 
 
+def test_root_readme(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).parents[3]
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    ((example, output),) = re.findall("```python\n(.*?)```\n\n```text\n(.*?)```", readme, re.DOTALL)
+    monkeypatch.chdir(root)
+    exec(example, {})
+    assert capsys.readouterr().out == output
+
+
 @pytest.mark.parametrize("name", [n for n in qp.__all__ if n != "__version__"])
 def test_everything_is_documented(name: str) -> None:
     public = getattr(qp, name)

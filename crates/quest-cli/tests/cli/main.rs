@@ -5,6 +5,7 @@ mod bad_input;
 mod candidates;
 mod formats;
 mod output;
+mod readme;
 
 use std::{
     fs,
