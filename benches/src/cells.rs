@@ -13,11 +13,11 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Both sets of candidates of the solvers.
+    /// Both sets of candidates of those solvers to which this many matches are enough.
     #[must_use]
-    pub fn of(solvers: &[SolverName]) -> Vec<Self> {
+    pub fn of(solvers: &[SolverName], matches: usize) -> Vec<Self> {
         let both = |&solver| [Kinds::Exact, Kinds::All].map(|kinds| Self { solver, kinds });
-        solvers.iter().flat_map(both).collect()
+        solvers.iter().filter(|s| s.info().min_matches <= matches).flat_map(both).collect()
     }
 
     /// The name of the solver.

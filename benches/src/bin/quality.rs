@@ -58,6 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if arguments.solvers.is_empty() {
         arguments.solvers = SolverName::ALL.to_vec();
     }
+    arguments.solvers.retain(|solver| solver.info().min_matches <= 5);
     println!("{} scenes a row, seed {}", arguments.scenes, arguments.seed);
     for name in &arguments.tables {
         match name {
@@ -105,7 +106,7 @@ fn judge(cell: Cell, scene: &Scene) -> Judged {
 fn failures(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let mut table =
         table(["scenes", "solver", "kinds", "R fails", "pose fails", "median R", "99.9 % R", "candidates"]);
-    let cells = Cell::of(&arguments.solvers);
+    let cells = Cell::of(&arguments.solvers, 5);
     let mut failing = Vec::new();
     for kind in kinds::noise_free().iter().filter(|kind| arguments.is_wanted(kind)) {
         let judge_all = |scene: &Scene| cells.iter().map(|&cell| judge(cell, scene)).collect::<Vec<_>>();
@@ -158,7 +159,7 @@ struct Noisy {
 
 fn judge_noisy(solver: SolverName, scene: &Scene) -> Noisy {
     let (five, further) = scene.matches.split_at(5);
-    let judged = Cell::of(&[solver]).into_iter().map(|cell| {
+    let judged = Cell::of(&[solver], 5).into_iter().map(|cell| {
         let mut out = Candidates::new();
         cell.solve(five, &mut out);
         let best = errors::rotation_error(&scene.truth, &out);

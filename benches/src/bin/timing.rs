@@ -56,9 +56,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let noisy = scenes(&arguments, 0.75)?;
     let solvers: &[SolverName] =
         if arguments.solvers.is_empty() { &SolverName::ALL } else { &arguments.solvers };
-    let cells = Cell::of(solvers);
+    let cells = Cell::of(solvers, usize::try_from(arguments.points)?);
     if let Some(solves) = arguments.callgrind {
-        only_solve(cells[usize::from(!arguments.exact)], &noisy, solves);
+        let cell = cells.get(usize::from(!arguments.exact)).ok_or("too few matches for this solver")?;
+        only_solve(*cell, &noisy, solves);
         return Ok(());
     }
     let clean = scenes(&arguments, 0.0)?;
