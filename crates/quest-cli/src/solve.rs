@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             );
         }
         arguments.set_cameras(&mut pair)?;
-        if let Outcome::NoPose = one_pair(arguments, &pair, &mut writer)? {
+        if let Outcome::NoPose = one_pair(arguments, &pair, is_lines, &mut writer)? {
             outcome = Outcome::NoPose;
         }
     }
@@ -119,7 +119,12 @@ impl Arguments {
     }
 }
 
-fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<Outcome, Failure> {
+fn one_pair(
+    arguments: &Arguments,
+    pair: &Pair,
+    is_lines: bool,
+    writer: &mut Writer,
+) -> Result<Outcome, Failure> {
     let info = arguments.solver.info();
     let matches = pair.correspondences()?;
     if matches.len() < info.min_matches {
@@ -132,6 +137,10 @@ fn one_pair(arguments: &Arguments, pair: &Pair, writer: &mut Writer) -> Result<O
         KindsArgument::Exact => Kinds::Exact,
     };
     arguments.solver.solve(kinds, &matches, &mut found);
+    // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
+    if let (false, true, Some(degeneracy)) = (is_lines, found.is_empty(), found.degeneracy()) {
+        return Err(pair.refuse(InputError::Degenerate(degeneracy)).into());
+    }
 
     let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
     let most_in_front = record.candidates.iter().map(|c| c.in_front).max();

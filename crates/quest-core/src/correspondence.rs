@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::camera::MAX_IMAGE_COORDINATE;
-use crate::{Camera, CameraError};
+use crate::{Camera, CameraError, Degeneracy};
 
 /// One match: the viewing rays of the same point in camera 1 and in camera 2.
 ///
@@ -78,6 +78,9 @@ pub enum InputError {
         /// Points in view 2.
         second: usize,
     },
+    /// The matches determine no pose.
+    #[error("{0}, expected matches that determine a pose")]
+    Degenerate(Degeneracy),
     /// There are fewer matches than the solver needs.
     #[error("found {found} matches, expected at least {needed}")]
     TooFewMatches {
