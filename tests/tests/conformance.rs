@@ -10,6 +10,8 @@ use quest_core::simulate::{Layout, Motion, Scene, SceneOptions};
 use quest_core::solver::{Kinds, SolverName};
 use quest_core::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 use quest_tests::scenes::scenes;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 const SEED_PLANTED: u64 = 300;
 const SEED_NOISY: u64 = 301;
@@ -200,6 +202,28 @@ fn bad_input_has_its_reason(subject: &Subject) {
     assert_eq!(verdict(&[]), (Some(Degeneracy::TooFewMatches), 0));
 }
 
+/// Points on a coarse grid: repeated, in lines, in squares, the same in both views.
+fn coarse_points_give_finite_candidates(subject: &Subject) {
+    let least = subject.solver.info().min_matches;
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED_DEGENERATE + 2);
+    for round in 0..20_000 {
+        let size = if round % 2 == 0 { 1 } else { 3 };
+        let mut coordinate = || f64::from(rng.random_range(-size..=size)) * 0.25;
+        let matches: Vec<_> = (0..least + round % 5)
+            .map(|_| [coordinate(), coordinate(), coordinate(), coordinate()])
+            .map(|[u1, v1, u2, v2]| Correspondence::from_image_points([u1, v1], [u2, v2]).unwrap())
+            .collect();
+        let found = subject.solve(Kinds::All, &matches);
+        for c in found.iter() {
+            assert!((c.pose.q_21.norm() - 1.0).abs() < 1e-12, "round {round}: {c:?}");
+            assert!(
+                c.pose.t_21.iter().all(|x| x.is_finite()) && c.residual.is_finite(),
+                "round {round}: {c:?}"
+            );
+        }
+    }
+}
+
 fn pure_rotations_are_named(subject: &Subject) {
     for points in [subject.options.points, 100] {
         let options = SceneOptions { motion: Motion::PureRotation, points, ..subject.realistic() };
@@ -277,6 +301,7 @@ macro_rules! laws {
             exchanging_the_views_inverts_the_poses,
             candidates_are_finite_and_ranked,
             bad_input_has_its_reason,
+            coarse_points_give_finite_candidates,
             pure_rotations_are_named,
             noise_moves_the_pose_a_little,
             $($more,)*
