@@ -10,6 +10,8 @@ use quest_core::simulate::{Layout, Motion, Scene, SceneOptions};
 use quest_core::solver::{Kinds, SolverName};
 use quest_core::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 use quest_tests::scenes::scenes;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 const SEED_PLANTED: u64 = 300;
 const SEED_NOISY: u64 = 301;
@@ -34,6 +36,8 @@ struct Subject {
     /// How many of 1,000 noisy problems may have other solutions after a change that should not matter, in number or
     /// by more than [`SAME`]: those with nearly double ones.
     most_different: usize,
+    /// Which part of the solutions of five matches may have a residual above 1e-9.
+    most_imprecise: f64,
 }
 
 impl Subject {
@@ -198,6 +202,28 @@ fn bad_input_has_its_reason(subject: &Subject) {
     assert_eq!(verdict(&[]), (Some(Degeneracy::TooFewMatches), 0));
 }
 
+/// Points on a coarse grid: repeated, in lines, in squares, the same in both views.
+fn coarse_points_give_finite_candidates(subject: &Subject) {
+    let least = subject.solver.info().min_matches;
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED_DEGENERATE + 2);
+    for round in 0..20_000 {
+        let size = if round % 2 == 0 { 1 } else { 3 };
+        let mut coordinate = || f64::from(rng.random_range(-size..=size)) * 0.25;
+        let matches: Vec<_> = (0..least + round % 5)
+            .map(|_| [coordinate(), coordinate(), coordinate(), coordinate()])
+            .map(|[u1, v1, u2, v2]| Correspondence::from_image_points([u1, v1], [u2, v2]).unwrap())
+            .collect();
+        let found = subject.solve(Kinds::All, &matches);
+        for c in found.iter() {
+            assert!((c.pose.q_21.norm() - 1.0).abs() < 1e-12, "round {round}: {c:?}");
+            assert!(
+                c.pose.t_21.iter().all(|x| x.is_finite()) && c.residual.is_finite(),
+                "round {round}: {c:?}"
+            );
+        }
+    }
+}
+
 fn pure_rotations_are_named(subject: &Subject) {
     for points in [subject.options.points, 100] {
         let options = SceneOptions { motion: Motion::PureRotation, points, ..subject.realistic() };
@@ -236,7 +262,7 @@ fn residuals_are_rounding(subject: &Subject) {
         all += found.len();
         above += found.iter().filter(|c| c.residual > 1e-9).count();
     }
-    assert!(50 * above < all, "{above} of {all}");
+    assert!(above as f64 <= subject.most_imprecise * all as f64, "{above} of {all}");
 }
 
 /// A true pose that noise does not move far stays near a candidate, complex ones included.
@@ -275,6 +301,7 @@ macro_rules! laws {
             exchanging_the_views_inverts_the_poses,
             candidates_are_finite_and_ranked,
             bad_input_has_its_reason,
+            coarse_points_give_finite_candidates,
             pure_rotations_are_named,
             noise_moves_the_pose_a_little,
             $($more,)*
@@ -289,8 +316,23 @@ fn five_points() -> SceneOptions {
     SceneOptions::default()
 }
 
-laws!(five_point nister: Subject { solver: SolverName::Nister, options: five_points(), most_lost: [3, 3], most_lost_of_more: 3, most_different: 20 });
-laws!(five_point stewenius: Subject { solver: SolverName::Stewenius, options: five_points(), most_lost: [1, 1], most_lost_of_more: 3, most_different: 20 });
+laws!(five_point nister: Subject {
+    solver: SolverName::Nister,
+    options: five_points(),
+    most_lost: [3, 3],
+    most_lost_of_more: 1,
+    most_different: 15,
+    most_imprecise: 2e-2,
+});
+
+laws!(five_point stewenius: Subject {
+    solver: SolverName::Stewenius,
+    options: five_points(),
+    most_lost: [0, 0],
+    most_lost_of_more: 0,
+    most_different: 1,
+    most_imprecise: 2e-3,
+});
 
 laws!(common eight_point: Subject {
     solver: SolverName::EightPoint,
@@ -298,6 +340,7 @@ laws!(common eight_point: Subject {
     most_lost: [1, 1],
     most_lost_of_more: 0,
     most_different: 1,
+    most_imprecise: 1.0,
 };);
 
 laws!(common homography: Subject {
@@ -306,4 +349,5 @@ laws!(common homography: Subject {
     most_lost: [1, 1],
     most_lost_of_more: 0,
     most_different: 6,
+    most_imprecise: 1.0,
 };);

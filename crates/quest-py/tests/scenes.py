@@ -44,10 +44,12 @@ def rotation(w: Array) -> Array:
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
-def make_scene(seed: int, n: int = 5) -> Scene:
+def make_scene(seed: int, n: int = 5, planar: bool = False) -> Scene:
     rng = np.random.default_rng(seed)
     R, t = rotation(rng.uniform(-0.3, 0.3, 3)), rng.uniform(-1.0, 1.0, 3)
     X1 = rng.uniform(-1.0, 1.0, (n, 3)) + [0.0, 0.0, 4.0]
+    if planar:
+        X1[:, 2] = 4.0 + X1[:, :2] @ [0.3, -0.2]
     X2 = X1 @ R.T + t
     scale = np.mean([X1[:, 2], X2[:, 2]])
     return Scene(R, t / scale, X1 / scale, X2 / scale)

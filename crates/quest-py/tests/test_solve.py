@@ -37,8 +37,8 @@ def test_planted_pose(seed: int, n: int) -> None:
 
 @pytest.mark.parametrize("solver", [s.name for s in qp.solvers()])
 def test_every_solver(solver: str) -> None:
-    scene = make_scene(seed=1)
     info = {s.name: s for s in qp.solvers()}[solver]
+    scene = make_scene(seed=1, n=max(5, info.min_matches), planar=solver == "homography")
     candidates = qp.solve(scene.x1, scene.x2, solver=solver)
     assert_found(candidates, scene)
     assert len(candidates) <= info.max_candidates

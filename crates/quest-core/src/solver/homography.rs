@@ -82,11 +82,18 @@ fn homography(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
     Some(view2.inverse * Matrix3::from_row_slice(&normalised) * view1.transform)
 }
 
+/// A middle singular value this small against the largest one leaves no digit of its direction.
+const RANK_ONE: f64 = 1e-7;
+
 /// One motion of each of the two essential matrices of a plane; none for a rotation alone.
 fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
     let svd = h.svd(false, true);
     let Some(v_t) = svd.v_t else { return [None; 2] };
     let middle = svd.singular_values[1];
+    // Of rank one, as far as can be told (the squares are decomposed): it takes all points to the same one.
+    if middle <= RANK_ONE * svd.singular_values[0] {
+        return [None; 2];
+    }
     let h = h / middle;
     let [largest, smallest] = [0, 2].map(|k| (svd.singular_values[k] / middle).powi(2));
     // Rounding may put them on the wrong side of one.
@@ -101,7 +108,7 @@ fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
         let r_21 = after * before.transpose();
         let direction = ((h - r_21) * normal).try_normalize(0.0)?;
         let q_21 = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(r_21));
-        Some(Motion { q_21, direction })
+        Some(Motion { q_21: UnitQuaternion::new_normalize(q_21.into_inner()), direction })
     })
 }
 
@@ -132,7 +139,9 @@ mod tests {
     }
 
     #[test]
-    fn rotation_alone_has_no_plane() {
+    fn rotations_and_matrices_of_rank_one_have_no_motion() {
         assert!(motions(&Matrix3::identity()).iter().all(Option::is_none));
+        assert!(motions(&Matrix3::from_element(1.0)).iter().all(Option::is_none));
+        assert!(motions(&Matrix3::zeros()).iter().all(Option::is_none));
     }
 }

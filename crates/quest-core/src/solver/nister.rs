@@ -22,13 +22,12 @@
 //! polynomial: near a double root half of the digits are gone. Every candidate is [`Exact`](crate::CandidateKind::Exact).
 //!
 //! For more than five matches the null space is spanned by the four directions that all constraints together leave the
-//! smallest sum of squares (3.1, last paragraph); nothing is refined either. The directions that many matches determine
-//! worst are nearly tangent to the essential matrices, so that the best solution is nearly a double root: without
-//! noise 4 in 1,000 true poses are lost with 100 matches, and with noise it is often a complex one.
+//! smallest sum of squares (3.1, last paragraph); nothing is refined either.
 //!
 //! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points); an exact pure
-//! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.001 one true pose in five
-//! is lost, which is what [`quest`](super::quest) is for.
+//! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.001 one true rotation in three is off
+//! by more than a thousandth of it, and one in twenty by more than all of it, which is what [`quest`](super::quest)
+//! is for.
 //!
 //! **Solutions**: at most ten essential matrices, twenty motions.
 

@@ -20,7 +20,8 @@
 //! directions that all constraints together leave the smallest sum of squares; nothing is refined either.
 //!
 //! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points); an exact pure
-//! rotation. As the parallax vanishes the ten solutions run together, and some are lost to rounding.
+//! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.001 one true rotation in seven is off
+//! by more than a thousandth of it.
 //!
 //! **Solutions**: ten essential matrices, counting complex ones, a conjugate pair of which gives two candidates and a real
 //! one two: at most twenty.
