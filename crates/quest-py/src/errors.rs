@@ -44,6 +44,7 @@ pub(crate) fn input(error: &InputError) -> PyErr {
         },
         InputError::LengthMismatch { .. } => ShapeMismatch::new_err(message),
         InputError::TooFewMatches { .. } => TooFewMatches::new_err(message),
+        InputError::Degenerate { .. } => DegenerateInput::new_err(message),
         InputError::TooManyMatches { .. } => PyMemoryError::new_err(message),
         _ => QuestError::new_err(message),
     }
