@@ -40,8 +40,9 @@ pub(super) fn draw(canvas: &Canvas, panel: &Panel, size: [i32; 2]) -> Result<(),
         .map_err(drawing)?;
     chart
         .configure_mesh()
-        .x_labels(usize::try_from(inside[0] / 70).unwrap_or(0).clamp(2, 10))
+        .x_labels(usize::try_from(inside[0] / 42).unwrap_or(0).clamp(2, 10))
         .y_labels(usize::try_from(inside[1] / 45).unwrap_or(0).clamp(2, 10))
+        .set_all_tick_mark_size(4 * FINE)
         .light_line_style(TRANSPARENT)
         .bold_line_style(ink::stroke(GRID, 10, 1.0))
         .axis_style(ink::stroke(MUTED, 10, 1.0))
@@ -108,7 +109,7 @@ fn draw_series(
         band.map(|b| (here([b[0], clamped(b[1])]), here([b[0], clamped(b[2])]))).unzip();
     if edges.0.len() > 1 {
         let outline = edges.0.into_iter().chain(edges.1.into_iter().rev()).collect();
-        ink::area(canvas, outline, series.colour, 0.13)?;
+        ink::area(canvas, outline, series.colour, 0.10)?;
     }
     let dots = || series.points.iter().filter(|p| is_inside(p)).map(|p| here(*p));
     let tenths = if series.style == Style::Thick { 26 } else { 15 };
@@ -155,9 +156,15 @@ fn draw_labels(
         let last = series.points.iter().rev().find(|p| is_inside(panel, ranges, **p))?;
         Some((series, local(canvas, chart, *last)))
     });
-    let ends: Vec<_> = ends.collect();
     let (across, down) = chart.plotting_area().get_pixel_range();
     let (left, top) = canvas.get_base_pixel();
+    // A curve that ends within the panel has its label there.
+    let is_at_the_right = |(_, end): &(&Series, (i32, i32))| end.0 + left > across.end - 40 * FINE;
+    let (ends, within): (Vec<_>, Vec<_>) = ends.partition(is_at_the_right);
+    for (series, (x, y)) in within {
+        let position = (x / FINE + 7, y / FINE - 7);
+        ink::text(canvas, &series.label, position, HPos::Left, Weight::Normal, 12, series.colour)?;
+    }
     let fine = f64::from(FINE);
     let height = f64::from(down.end - down.start) / fine;
     let wanted: Vec<f64> = ends.iter().map(|(_, p)| f64::from(p.1 + top - down.start) / fine).collect();
