@@ -40,7 +40,7 @@ impl Figure {
 
     /// The scenes of each value of what is varied in the paper.
     #[must_use]
-    pub fn trials(self) -> usize {
+    pub fn trials(self) -> u32 {
         if self == Self::Six { 40 } else { 100 }
     }
 
