@@ -8,14 +8,18 @@ mod essential;
 mod five_point;
 pub mod homography;
 mod least_squares;
+mod moments;
 mod motion;
 pub mod nister;
 mod normalisation;
 pub mod quest;
 pub mod quest_eigen;
+mod refining;
+pub mod relinearization;
 mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
+mod twenty;
 
 use std::str::FromStr;
 
@@ -24,6 +28,7 @@ pub use homography::Homography;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+pub use relinearization::Relinearization;
 pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
@@ -58,6 +63,8 @@ pub enum SolverName {
     Quest,
     /// [`QuestEigen`].
     QuestEigen,
+    /// [`Relinearization`].
+    Relinearization,
     /// [`Nister`].
     Nister,
     /// [`Stewenius`].
@@ -91,8 +98,15 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 6] =
-        [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius, Self::Homography, Self::EightPoint];
+    pub const ALL: [Self; 7] = [
+        Self::Quest,
+        Self::QuestEigen,
+        Self::Relinearization,
+        Self::Nister,
+        Self::Stewenius,
+        Self::Homography,
+        Self::EightPoint,
+    ];
 
     /// The table's row.
     #[must_use]
@@ -109,6 +123,12 @@ impl SolverName {
                 min_matches: QuestEigen::MIN_MATCHES,
                 max_candidates: 21,
                 reference: "Fathian et al., RAS 2018, section 7.1",
+            },
+            Self::Relinearization => SolverInfo {
+                name: Relinearization::NAME,
+                min_matches: Relinearization::MIN_MATCHES,
+                max_candidates: 21,
+                reference: "Fathian et al., RAS 2018, section 7.2",
             },
             Self::Nister => SolverInfo {
                 name: Nister::NAME,
@@ -142,6 +162,7 @@ impl SolverName {
         match self {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+            Self::Relinearization => Relinearization { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
