@@ -163,6 +163,15 @@ mod tests {
         Linearized::new(&Mat::from_fn(3, 5, |i, j| c[i][j]), &[0.0, 0.0, 1.0])
     }
 
+    /// (9).
+    fn printed() -> Linearized {
+        let v = [[7.0, -4.0, 1.0, 2.0, -5.0], [0.0, -8.0, 20.0, -42.0, 85.0]];
+        Linearized {
+            particular: vec![-6.0, 2.0, 3.0, -10.0, 21.0],
+            directions: Mat::from_fn(5, 2, |i, j| v[j][i]),
+        }
+    }
+
     #[test]
     fn example_1_has_its_two_solutions() {
         let example = example_1();
@@ -171,24 +180,34 @@ mod tests {
         assert_eq!((d_bar.nrows(), d_bar.ncols()), (6, 6));
         assert_eq!(null_space(&d_bar).ncols(), 2);
         let solutions = example.solutions(&MONOMIALS).unwrap();
-        let mut found: Vec<_> = solutions.iter().map(|x| unknowns(&MONOMIALS, 4, x)).collect();
-        found.sort_by(|p, q| p[1].re.total_cmp(&q[1].re));
-        assert_eq!(found.len(), 2);
-        // The first has its largest unknown in second place, and its sign from that.
-        for (q, expected) in found.iter().zip([[-0.5, 1.0], [-1.0, 2.0]]) {
-            println!("{q:?} {expected:?}");
+        let ratios = solutions.iter().map(|x| {
+            let [q1, q2, q3, q4] = unknowns(&MONOMIALS, 4, x);
+            // The scale is that of (4), whose right-hand side is of degree 4: q and −q, i q, −i q.
+            assert!((q1.norm() - 1.0).abs() < 1e-9 && q3.norm() == 0.0 && q4.norm() == 0.0);
+            q2 / q1
+        });
+        let mut ratios: Vec<_> = ratios.collect();
+        ratios.sort_by(|a, b| a.re.total_cmp(&b.re));
+        assert_eq!(ratios.len(), 2);
+        assert!((ratios[0] + 2.0).norm() < 1e-9 && (ratios[1] + 0.5).norm() < 1e-9, "{ratios:?}");
+    }
+
+    #[test]
+    fn the_eigenvalues_of_example_1() {
+        // (25), in the printed basis: s = (1, 0) and (1, −3/16).
+        let solutions = printed().solutions(&MONOMIALS).unwrap();
+        let expected = [[1.0, -2.0, 4.0, -8.0, 16.0], [1.0, -0.5, 0.25, -0.125, 0.0625]];
+        assert_eq!(solutions.len(), 2);
+        for x in expected {
+            let distance = |y: &Vec<c64>| (0..5).map(|k| (y[k] - x[k]).norm()).fold(0.0, f64::max);
+            assert!(solutions.iter().any(|y| distance(y) < 1e-9));
         }
     }
 
     #[test]
-    fn example_1_as_printed() {
-        // (9), and D of (15). Its d, which has no part in the solutions, is printed with the opposite sign.
-        let v = [[7.0, -4.0, 1.0, 2.0, -5.0], [0.0, -8.0, 20.0, -42.0, 85.0]];
-        let printed = Linearized {
-            particular: vec![-6.0, 2.0, 3.0, -10.0, 21.0],
-            directions: Mat::from_fn(5, 2, |i, j| v[j][i]),
-        };
-        let d_bar = printed.relinearized(&MONOMIALS);
+    fn the_relinearized_system_of_example_1() {
+        // D of (15). Its d, which has no part in the solutions, is printed with the opposite sign.
+        let d_bar = printed().relinearized(&MONOMIALS);
         // Columns s1², s2², s1 s2, s1, s2, and d.
         let rows = [
             [-9.0, -64.0, 76.0, 31.0, -88.0, -22.0],
