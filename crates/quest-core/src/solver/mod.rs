@@ -6,8 +6,11 @@ mod cubics;
 pub mod eight_point;
 mod essential;
 mod five_point;
+mod hidden_variable;
 pub mod homography;
+pub mod kukelova;
 mod least_squares;
+pub mod li_hartley;
 mod moments;
 mod motion;
 pub mod nister;
@@ -25,6 +28,8 @@ use std::str::FromStr;
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;
+pub use kukelova::Kukelova;
+pub use li_hartley::LiHartley;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
@@ -69,6 +74,10 @@ pub enum SolverName {
     Nister,
     /// [`Stewenius`].
     Stewenius,
+    /// [`LiHartley`].
+    LiHartley,
+    /// [`Kukelova`].
+    Kukelova,
     /// [`Homography`].
     Homography,
     /// [`EightPoint`].
@@ -98,12 +107,14 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Relinearization,
         Self::Nister,
         Self::Stewenius,
+        Self::LiHartley,
+        Self::Kukelova,
         Self::Homography,
         Self::EightPoint,
     ];
@@ -142,6 +153,18 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Stewénius, Engels, Nistér, ISPRS 2006",
             },
+            Self::LiHartley => SolverInfo {
+                name: LiHartley::NAME,
+                min_matches: LiHartley::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Li, Hartley, ICPR 2006",
+            },
+            Self::Kukelova => SolverInfo {
+                name: Kukelova::NAME,
+                min_matches: Kukelova::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
+            },
             Self::Homography => SolverInfo {
                 name: Homography::NAME,
                 min_matches: Homography::MIN_MATCHES,
@@ -165,6 +188,8 @@ impl SolverName {
             Self::Relinearization => Relinearization { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
+            Self::LiHartley => LiHartley { kinds }.solve(matches, out),
+            Self::Kukelova => Kukelova { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
         }
