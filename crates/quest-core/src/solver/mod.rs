@@ -8,6 +8,7 @@ mod essential;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
+pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
@@ -24,6 +25,7 @@ use std::str::FromStr;
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;
+pub use kneip::Kneip;
 pub use kukelova::Kukelova;
 pub use li_hartley::LiHartley;
 pub use nister::Nister;
@@ -71,6 +73,8 @@ pub enum SolverName {
     LiHartley,
     /// [`Kukelova`].
     Kukelova,
+    /// [`Kneip`].
+    Kneip,
     /// [`Homography`].
     Homography,
     /// [`EightPoint`].
@@ -100,13 +104,14 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Nister,
         Self::Stewenius,
         Self::LiHartley,
         Self::Kukelova,
+        Self::Kneip,
         Self::Homography,
         Self::EightPoint,
     ];
@@ -151,6 +156,12 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
             },
+            Self::Kneip => SolverInfo {
+                name: Kneip::NAME,
+                min_matches: Kneip::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Kneip, Siegwart, Pollefeys, ECCV 2012",
+            },
             Self::Homography => SolverInfo {
                 name: Homography::NAME,
                 min_matches: Homography::MIN_MATCHES,
@@ -175,6 +186,7 @@ impl SolverName {
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
             Self::LiHartley => LiHartley { kinds }.solve(matches, out),
             Self::Kukelova => Kukelova { kinds }.solve(matches, out),
+            Self::Kneip => Kneip { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
         }
