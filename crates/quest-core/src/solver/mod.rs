@@ -8,6 +8,7 @@ mod essential;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
+pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
@@ -28,6 +29,7 @@ use std::str::FromStr;
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;
+pub use kneip::Kneip;
 pub use kukelova::Kukelova;
 pub use li_hartley::LiHartley;
 pub use nister::Nister;
@@ -78,6 +80,8 @@ pub enum SolverName {
     LiHartley,
     /// [`Kukelova`].
     Kukelova,
+    /// [`Kneip`].
+    Kneip,
     /// [`Homography`].
     Homography,
     /// [`EightPoint`].
@@ -115,6 +119,7 @@ impl SolverName {
         Self::Stewenius,
         Self::LiHartley,
         Self::Kukelova,
+        Self::Kneip,
         Self::Homography,
         Self::EightPoint,
     ];
@@ -165,6 +170,12 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
             },
+            Self::Kneip => SolverInfo {
+                name: Kneip::NAME,
+                min_matches: Kneip::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Kneip, Siegwart, Pollefeys, ECCV 2012",
+            },
             Self::Homography => SolverInfo {
                 name: Homography::NAME,
                 min_matches: Homography::MIN_MATCHES,
@@ -190,6 +201,7 @@ impl SolverName {
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
             Self::LiHartley => LiHartley { kinds }.solve(matches, out),
             Self::Kukelova => Kukelova { kinds }.solve(matches, out),
+            Self::Kneip => Kneip { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
         }
