@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::solver::essential::{decompose, twisted};
 
@@ -14,7 +14,8 @@ pub struct Essentials {
     /// Where the matrices of each sample begin, and the end of the last.
     first: Vec<u32>,
     complete: Vec<bool>,
-    columns: [Vec<f64>; 9],
+    /// Row by row.
+    matrices: Vec<[f64; 9]>,
 }
 
 impl Essentials {
@@ -24,14 +25,14 @@ impl Essentials {
     /// An empty list.
     #[must_use]
     pub fn new() -> Self {
-        Self { first: vec![0], complete: Vec::new(), columns: [const { Vec::new() }; 9] }
+        Self { first: vec![0], complete: Vec::new(), matrices: Vec::new() }
     }
 
     /// Empties the list, and keeps its memory.
     pub fn clear(&mut self) {
         self.first.truncate(1);
         self.complete.clear();
-        self.columns.iter_mut().for_each(Vec::clear);
+        self.matrices.clear();
     }
 
     /// How many samples there are.
@@ -43,7 +44,7 @@ impl Essentials {
     /// How many essential matrices all samples have together.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.columns[0].len()
+        self.matrices.len()
     }
 
     /// Whether no sample has an essential matrix.
@@ -67,42 +68,25 @@ impl Essentials {
         self.complete.get(sample).copied().unwrap_or(false)
     }
 
-    /// The entries `E11, E12, E13, E21, …, E33` of all matrices, one column an entry.
+    /// All matrices, row by row: `E = [t]× R_21` with a unit vector `t` of either sign, `x2ᵀ E x1 = 0`.
     #[must_use]
-    pub fn columns(&self) -> [&[f64]; 9] {
-        self.columns.each_ref().map(Vec::as_slice)
-    }
-
-    /// Matrix `k`, `E = [t]× R_21` with a unit vector `t` of either sign: `x2ᵀ E x1 = 0`.
-    ///
-    /// # Panics
-    /// Where there is no matrix `k`.
-    #[must_use]
-    pub fn matrix(&self, k: usize) -> Matrix3<f64> {
-        Matrix3::from_row_iterator(self.columns.iter().map(|column| column[k]))
+    pub fn matrices(&self) -> &[[f64; 9]] {
+        &self.matrices
     }
 
     /// The two rotations `R_21` of matrix `k` and the direction of its translation, a unit vector of either sign; `None`
     /// for a matrix that is not there.
     #[must_use]
     pub fn motions(&self, k: usize) -> Option<([UnitQuaternion<f64>; 2], Vector3<f64>)> {
-        if k >= self.len() {
-            return None;
-        }
-        let e = self.matrix(k);
-        let rows = std::array::from_fn(|i| std::array::from_fn(|j| e[(i, j)]));
-        let (q, t) = decompose(&rows)?;
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = *self.matrices.get(k)?;
+        let (q, t) = decompose(&[[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]])?;
         let unit = |[w, x, y, z]: [f64; 4]| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
         Some(([unit(q), unit(twisted(&q, &t))], Vector3::from(t).normalize()))
     }
 
     /// Appends the essential matrices of one more sample.
     pub(super) fn push_sample(&mut self, complete: bool, matrices: impl Iterator<Item = [f64; 9]>) {
-        for e in matrices {
-            for (column, x) in self.columns.iter_mut().zip(e) {
-                column.push(x);
-            }
-        }
+        self.matrices.extend(matrices);
         self.complete.push(complete);
         self.first.push(u32::try_from(self.len()).unwrap_or(u32::MAX));
     }

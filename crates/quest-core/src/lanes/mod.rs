@@ -22,7 +22,7 @@
 //! solver.solve(&matches, &samples, &mut found)?;
 //! for sample in 0..found.samples() {
 //!     for k in found.of(sample) {
-//!         println!("{sample}: {}", found.matrix(k));
+//!         println!("{sample}: {:?}", found.matrices()[k]);
 //!     }
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
