@@ -29,9 +29,21 @@
 //! ```
 
 mod batch;
+mod cubics;
+mod elimination;
 mod essentials;
+mod frame;
+mod geometry;
 mod instructions;
+mod lane;
+mod motion;
+mod null_space;
+mod portable;
+mod resultant;
+mod roots;
 mod score;
+#[cfg(target_arch = "x86_64")]
+mod vector;
 
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
