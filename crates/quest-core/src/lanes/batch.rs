@@ -267,15 +267,8 @@ fn solve_group<L: WordLanes>(
         let slot = [lanes.splat(k as f64), lanes.splat((k + 1) as f64)];
         let is_there = slot.map(|s| s.less(count));
         let accuracy = if tolerance == Tolerance::Tight { 1e-8 } else { 1e-6 };
-        let roots = roots::refine::<L, TOGETHER>(
-            lanes,
-            &polynomial,
-            &mirrored,
-            &cells,
-            k,
-            &is_there,
-            accuracy,
-        );
+        let roots =
+            roots::refine::<L, TOGETHER>(lanes, &polynomial, &mirrored, &cells, k, &is_there, accuracy);
         for i in 0..TOGETHER.min(found.most - k) {
             let point = resultant.point(roots[i].z, roots[i].w);
             let mut e = combination::<L>(&essentials, &point);

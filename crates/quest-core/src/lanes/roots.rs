@@ -3,10 +3,12 @@
 //! A root `z/w` is an angle, `(z, w) = (sin θ, cos θ)`, so that infinity is a place like any other. On it the polynomial is a
 //! trigonometric sum of `φ = 2θ` with five harmonics:
 //!
-//! 1. Its signs at [`ANGLES`] equal steps of `φ` are collected as the bits of a word in every lane; so is whether it falls
-//!    between them. The four angles `±φ, π ± φ` share their products.
-//! 2. A change of sign is a cell with one root. Where the sum comes near zero and turns around, a parabola says whether a
-//!    pair of roots may lie there; Newton's iteration on the derivative finds a point between them.
+//! 1. Its value and slope at [`ANGLES`] equal steps of `φ` make a cubic in every cell between two of them. The signs of the
+//!    four Bernstein coefficients of all cubics are collected as bits of words in every lane. The angles `±φ, π ± φ` share
+//!    their products.
+//! 2. Without a change of sign among the four a cell has no root, with one it has one. With more the cell is
+//!    divided where the cubic turns around, until each part has one or none; so few cells need that, that it is done lane by
+//!    lane.
 //! 3. In each cell Newton's iteration finds the root, in the coordinate `t = tan θ` or `tan(θ − π/2)` within `[−1, 1]`,
 //!    with bisection where it would leave the cell.
 //! 4. Sturm's theorem counts the roots from the leading coefficients of its chain alone: a lane with another count has
@@ -25,15 +27,15 @@ const CHART: usize = ANGLES / 2;
 const MAX_LANES: usize = 8;
 /// The most roots of a polynomial.
 pub(super) const MAX_ROOTS: usize = 10;
-/// The most extrema that come near zero.
-const MAX_DIPS: usize = 5;
+/// How often a cell is divided.
+const MAX_DIVISIONS: usize = 6;
 
 /// Numbers that do not depend on the polynomial.
 pub(super) struct Tables {
     /// `cos kφ` for k = 1 to 5, then `sin kφ`, at the angles of the first quadrant with both ends.
     harmonics: [[f64; 10]; ANGLES / 4 + 1],
-    /// `t` at the edges of the cells of a chart, with one cell more on either side.
-    edges: [f64; CHART + 3],
+    /// `t` at the edges of the cells of a chart.
+    edges: [f64; CHART + 1],
     /// Coefficient of `cos kφ` in `sin^2i cos^(10−2i)`.
     even: [[f64; 6]; 6],
     /// Coefficient of `sin (k+1)φ` in `sin^(2i+1) cos^(9−2i)`.
@@ -55,7 +57,7 @@ impl Tables {
                 if k < 5 { phi.cos() } else { phi.sin() }
             })
         });
-        let edges = std::array::from_fn(|i| (0.5 * angle(i as f64 - 1.0 - CHART as f64 / 2.0)).tan());
+        let edges = std::array::from_fn(|i| (0.5 * angle(i as f64 - 0.5 * CHART as f64)).tan());
         // The Fourier coefficients of a sum of five harmonics from any eleven or more samples; they are multiples of 2⁻⁹.
         let coefficient = |power: i32, function: fn(f64) -> f64, k: usize| {
             let sample = |n: usize| {
@@ -123,12 +125,16 @@ impl Cells {
     }
 }
 
-/// The values of the polynomial at the angles, and their signs.
+/// The polynomial at the angles.
 struct Grid {
     values: [[f64; MAX_LANES]; ANGLES],
+    /// The derivatives by `φ`, times a third of the step.
+    slopes: [[f64; MAX_LANES]; ANGLES],
+    /// The signs of the values, which begin and end the Bernstein coefficients of a cell, and of the coefficients next to them
+    /// in the cells behind and before.
     negative: [u64; MAX_LANES],
-    /// Whether it falls towards the next angle.
-    falling: [u64; MAX_LANES],
+    negative_behind: [u64; MAX_LANES],
+    negative_before: [u64; MAX_LANES],
 }
 
 #[inline(always)]
@@ -145,37 +151,54 @@ fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
             s[k] = p[2 * i + 1].mul_add(lanes.splat(tables.odd[i][k]), s[k]);
         }
     }
-    let mut out = Grid { values: [[0.0; MAX_LANES]; ANGLES], negative: [0; MAX_LANES], falling: [0; MAX_LANES] };
-    let (mut negative, mut falling) = (lanes.no_bits(), lanes.no_bits());
-    let mut before = [zero; 4];
+    // The derivatives of `c cos kφ + s sin kφ` by `φ` are `k s cos kφ − k c sin kφ`.
+    let (mut cs, mut ss) = ([zero; 6], [zero; 5]);
+    for k in 1..6 {
+        let order = lanes.splat(k as f64 * std::f64::consts::TAU / (3 * ANGLES) as f64);
+        cs[k] = order * s[k - 1];
+        ss[k - 1] = -(order * c[k]);
+    }
+    let (nothing, none) = ([[0.0; MAX_LANES]; ANGLES], [0; MAX_LANES]);
+    let mut out = Grid {
+        values: nothing,
+        slopes: nothing,
+        negative: none,
+        negative_behind: none,
+        negative_before: none,
+    };
+    let (mut at, mut behind, mut before) = (lanes.no_bits(), lanes.no_bits(), lanes.no_bits());
     const HALF: usize = ANGLES / 2;
     for (i, h) in tables.harmonics.iter().enumerate() {
         let h = h.map(|x| lanes.splat(x));
-        let cosine_even = c[4].mul_add(h[3], c[2].mul_add(h[1], c[0]));
-        let cosine_odd = c[5].mul_add(h[4], c[3].mul_add(h[2], c[1] * h[0]));
-        let sine_odd = s[4].mul_add(h[9], s[2].mul_add(h[7], s[0] * h[5]));
-        let sine_even = s[3].mul_add(h[8], s[1] * h[6]);
-        let (a, b) = (cosine_even + cosine_odd, cosine_even - cosine_odd);
-        let (f, g) = (sine_odd + sine_even, sine_odd - sine_even);
-        // At φ, π − φ, π + φ, −φ.
-        let now = [a + f, b + g, b - g, a - f];
+        let values = at_four_angles::<L>(&c, &s, &h);
+        let slopes = at_four_angles::<L>(&cs, &ss, &h);
         // The first two of the four quadrants share their ends, and so do the last two.
-        let at = [i, HALF - i, HALF + i, (ANGLES - i) % ANGLES];
-        for (quadrant, &j) in at.iter().enumerate() {
-            now[quadrant].store(&mut out.values[j]);
-            negative = lanes.with_bit(negative, now[quadrant].less(zero), 1 << j);
+        let angles = [i, HALF - i, HALF + i, (ANGLES - i) % ANGLES];
+        for (quadrant, &j) in angles.iter().enumerate() {
+            let (value, slope) = (values[quadrant], slopes[quadrant]);
+            value.store(&mut out.values[j]);
+            slope.store(&mut out.slopes[j]);
+            at = lanes.with_bit(at, value.less(zero), 1 << j);
+            behind = lanes.with_bit(behind, (value + slope).less(zero), 1 << j);
+            before = lanes.with_bit(before, (value - slope).less(zero), 1 << j);
         }
-        if i > 0 {
-            falling = lanes.with_bit(falling, now[0].less(before[0]), 1 << (i - 1));
-            falling = lanes.with_bit(falling, before[1].less(now[1]), 1 << (HALF - i));
-            falling = lanes.with_bit(falling, now[2].less(before[2]), 1 << (HALF + i - 1));
-            falling = lanes.with_bit(falling, before[3].less(now[3]), 1 << (ANGLES - i));
-        }
-        before = now;
     }
-    lanes.store_words(negative, &mut out.negative);
-    lanes.store_words(falling, &mut out.falling);
+    lanes.store_words(at, &mut out.negative);
+    lanes.store_words(behind, &mut out.negative_behind);
+    lanes.store_words(before, &mut out.negative_before);
     out
+}
+
+/// A sum of five harmonics at `φ, π − φ, π + φ, −φ`, by those of `φ`.
+#[inline(always)]
+fn at_four_angles<L: Lanes<f64>>(c: &[F<L>; 6], s: &[F<L>; 5], h: &[F<L>; 10]) -> [F<L>; 4] {
+    let cosine_even = c[4].mul_add(h[3], c[2].mul_add(h[1], c[0]));
+    let cosine_odd = c[5].mul_add(h[4], c[3].mul_add(h[2], c[1] * h[0]));
+    let sine_odd = s[4].mul_add(h[9], s[2].mul_add(h[7], s[0] * h[5]));
+    let sine_even = s[3].mul_add(h[8], s[1] * h[6]);
+    let (a, b) = (cosine_even + cosine_odd, cosine_even - cosine_odd);
+    let (f, g) = (sine_odd + sine_even, sine_odd - sine_even);
+    [a + f, b + g, b - g, a - f]
 }
 
 /// The chart of a cell and its place in it.
@@ -183,51 +206,6 @@ fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
 fn place(cell: usize) -> (usize, usize) {
     let shifted = (cell + ANGLES / 4) % ANGLES;
     (shifted / CHART, shifted % CHART)
-}
-
-/// How near to zero a parabola has to come, against its own curvature, for the extremum to be looked at.
-const NEAR: f64 = 0.5;
-
-/// For every lane the extrema that come near zero, with the cells on both sides of an angle as their bracket.
-struct Dips {
-    count: [usize; MAX_LANES],
-    low: [[f64; MAX_LANES]; MAX_DIPS],
-    high: [[f64; MAX_LANES]; MAX_DIPS],
-    at_low: [[f64; MAX_LANES]; MAX_DIPS],
-    at_high: [[f64; MAX_LANES]; MAX_DIPS],
-    chart: [[f64; MAX_LANES]; MAX_DIPS],
-    /// Where the parabola through three values has its vertex.
-    vertex: [[f64; MAX_LANES]; MAX_DIPS],
-}
-
-impl Dips {
-    fn new() -> Self {
-        let zero = [[0.0; MAX_LANES]; MAX_DIPS];
-        let (low, high, at_low, at_high, chart, vertex) = (zero, zero, zero, zero, zero, zero);
-        Self { count: [0; MAX_LANES], low, high, at_low, at_high, chart, vertex }
-    }
-
-    /// Adds the extremum near the end of cell `j − 1` unless a parabola says that it stays clear of zero.
-    #[inline(always)]
-    fn push(&mut self, lane: usize, j: usize, grid: &Grid, tables: &Tables) {
-        let at = |k: usize| grid.values[k % ANGLES][lane];
-        let (before, here, behind) = (at(j + ANGLES - 1), at(j), at(j + 1));
-        let (slope, bend) = (behind - before, behind + before - 2.0 * here);
-        let lowest = here - slope * slope / (8.0 * bend);
-        let slot = self.count[lane];
-        if slot == MAX_DIPS || lowest * here.signum() > NEAR * bend.abs() {
-            return;
-        }
-        let (chart, k) = place(j);
-        let (low, high) = (tables.edges[k], tables.edges[k + 2]);
-        self.low[slot][lane] = low;
-        self.high[slot][lane] = high;
-        self.at_low[slot][lane] = before;
-        self.at_high[slot][lane] = behind;
-        self.chart[slot][lane] = chart as f64;
-        self.vertex[slot][lane] = tables.edges[k + 1] - 0.25 * (high - low) * slope / bend;
-        self.count[lane] += 1;
-    }
 }
 
 /// The cells with a root.
@@ -239,91 +217,136 @@ pub(super) fn isolate<L: WordLanes>(
     mirrored: &Polynomial<L>,
 ) -> Cells {
     let grid = grid(lanes, tables, p);
-    let mut cells = Cells::new();
-    let mut dips = Dips::new();
-    for lane in 0..L::COUNT {
-        let (negative, falling) = (grid.negative[lane], grid.falling[lane]);
-        let changes = negative ^ negative.rotate_right(1);
-        let mut left = changes;
-        while left != 0 {
-            let j = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let (chart, k) = place(j);
-            cells.push(
-                lane,
-                Cell {
-                    low: tables.edges[k + 1],
-                    high: tables.edges[k + 2],
-                    at_low: grid.values[j][lane],
-                    at_high: grid.values[(j + 1) % ANGLES][lane],
-                    chart: chart as f64,
-                },
-            );
-        }
-        // Towards zero before the angle, away from it behind, without a change of sign.
-        let towards = falling.rotate_left(1) ^ negative;
-        let away = !(falling ^ negative);
-        let mut left = towards & away & !changes & !changes.rotate_left(1);
-        while left != 0 {
-            dips.push(lane, left.trailing_zeros() as usize, &grid, tables);
-            left &= left - 1;
-        }
+    let mut polynomials = [[[0.0; MAX_LANES]; 11]; 2];
+    for k in 0..11 {
+        p[k].store(&mut polynomials[0][k]);
+        mirrored[k].store(&mut polynomials[1][k]);
     }
-    let most = dips.count.iter().copied().max().unwrap_or(0);
-    for k in 0..most {
-        split(lanes, p, mirrored, &dips, k, &mut cells);
+    let mut cells = Cells::new();
+    for lane in 0..L::COUNT {
+        let (first, second) = (grid.negative[lane], grid.negative_behind[lane]);
+        let (third, last) = (grid.negative_before[lane].rotate_right(1), first.rotate_right(1));
+        let changes = [first ^ second, second ^ third, third ^ last];
+        let several = (changes[0] & changes[1]) | (changes[0] & changes[2]) | (changes[1] & changes[2]);
+        let mut simple = (first ^ last) & !several;
+        while simple != 0 {
+            let j = simple.trailing_zeros() as usize;
+            simple &= simple - 1;
+            let (chart, k) = place(j);
+            let (low, high) = (tables.edges[k], tables.edges[k + 1]);
+            let (at_low, at_high) = (grid.values[j][lane], grid.values[(j + 1) % ANGLES][lane]);
+            cells.push(lane, Cell { low, high, at_low, at_high, chart: chart as f64 });
+        }
+        let mut several = several;
+        while several != 0 {
+            let j = several.trailing_zeros() as usize;
+            several &= several - 1;
+            let (chart, k) = place(j);
+            let end = |j: usize, t: f64| End::new(t, grid.values[j][lane], grid.slopes[j][lane]);
+            let (low, high) = (end(j, tables.edges[k]), end((j + 1) % ANGLES, tables.edges[k + 1]));
+            let p = polynomials[chart].map(|coefficient| coefficient[lane]);
+            let divided = Divided { p, chart: chart as f64, lane };
+            divided.divide(&low, &high, MAX_DIVISIONS, &mut cells);
+        }
     }
     cells
 }
 
-/// Divides the brackets of extrema that lie beyond zero into two cells.
-#[inline(always)]
-fn split<L: Lanes<f64>>(
-    lanes: L,
-    p: &Polynomial<L>,
-    mirrored: &Polynomial<L>,
-    dips: &Dips,
-    k: usize,
-    cells: &mut Cells,
-) {
-    let (zero, one) = (lanes.splat(0.0), lanes.splat(1.0));
-    let p = in_chart::<L>(p, mirrored, zero.less(lanes.load(&dips.chart[k])));
-    let (low, high, outside) =
-        (lanes.load(&dips.low[k]), lanes.load(&dips.high[k]), lanes.load(&dips.at_low[k]));
-    let mut t = lanes.load(&dips.vertex[k]);
-    // The vertex, and what one and two of Newton's steps towards the extremum make of it.
-    for _ in 0..2 {
-        let (value, slope, bend) = with_derivatives::<L>(&p, t);
-        let next = t - slope / bend;
-        let moves = zero.less(value * outside).and(low.less(next)).and(next.less(high));
-        t = next.select(moves, t);
+/// An end of a cell: the polynomial and its derivative there.
+#[derive(Clone, Copy)]
+struct End {
+    t: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl End {
+    /// By the value of the sum of harmonics and its derivative as [`Grid`] has it: with `t = tan θ` the polynomial is
+    /// `(1 + t²)⁵` times that sum.
+    fn new(t: f64, value: f64, slope: f64) -> Self {
+        let by_phi = slope * (3 * ANGLES) as f64 / std::f64::consts::TAU;
+        let square = t * t + 1.0;
+        let fourth = square * square * (square * square);
+        Self { t, value: fourth * square * value, slope: fourth * (2.0 * by_phi + 10.0 * t * value) }
     }
-    let mut value = horner::<L>(&p, t);
-    let beyond = (value * outside).less(zero);
-    if beyond.any() {
-        // In the scale of the values at the angles.
-        let square = t.mul_add(t, one);
-        let fourth = square * square;
-        value = value / (fourth * fourth * square);
-        let (mut at, mut values, mut found) = ([0.0; MAX_LANES], [0.0; MAX_LANES], [0.0; MAX_LANES]);
-        t.store(&mut at);
-        value.store(&mut values);
-        one.select(beyond, zero).store(&mut found);
-        for lane in 0..L::COUNT {
-            if k < dips.count[lane] && found[lane] > 0.0 && cells.count[lane] + 2 <= MAX_ROOTS {
-                let (low, at_low) = (dips.low[k][lane], dips.at_low[k][lane]);
-                let (high, at_high) = (dips.high[k][lane], dips.at_high[k][lane]);
-                let (middle, at_middle, chart) = (at[lane], values[lane], dips.chart[k][lane]);
-                cells.push(lane, Cell { low, high: middle, at_low, at_high: at_middle, chart });
-                cells.push(lane, Cell { low: middle, high, at_low: at_middle, at_high, chart });
+}
+
+/// A cell to be divided, in one lane.
+struct Divided {
+    p: [f64; 11],
+    chart: f64,
+    lane: usize,
+}
+
+impl Divided {
+    /// Adds the parts of a cell with a root each.
+    fn divide(&self, low: &End, high: &End, divisions: usize, cells: &mut Cells) {
+        let third = (high.t - low.t) / 3.0;
+        let b = [
+            low.value,
+            low.value + third * low.slope,
+            high.value - third * high.slope,
+            high.value,
+        ];
+        let changes = b.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
+        match changes {
+            0 => {}
+            1 => self.push(low, high, cells),
+            _ if divisions == 0 => {
+                if (low.value < 0.0) != (high.value < 0.0) {
+                    self.push(low, high, cells);
+                }
+            }
+            _ => {
+                let middle = self.end(low.t + turning_point(&b) * (high.t - low.t));
+                self.divide(low, &middle, divisions - 1, cells);
+                self.divide(&middle, high, divisions - 1, cells);
             }
         }
     }
+
+    fn push(&self, low: &End, high: &End, cells: &mut Cells) {
+        let (at_low, at_high) = (low.value, high.value);
+        cells.push(self.lane, Cell { low: low.t, high: high.t, at_low, at_high, chart: self.chart });
+    }
+
+    fn end(&self, t: f64) -> End {
+        let (mut value, mut slope) = (self.p[10], 0.0);
+        for c in self.p[..10].iter().rev() {
+            slope = slope * t + value;
+            value = value * t + c;
+        }
+        End { t, value, slope }
+    }
+}
+
+/// Where in `(0, 1)` a cubic with these Bernstein coefficients has the extremum that is furthest beyond zero, or closest to it,
+/// as seen from its first value; the middle where it has none.
+fn turning_point(b: &[f64; 4]) -> f64 {
+    let [first, second, third] = [b[1] - b[0], b[2] - b[1], b[3] - b[2]];
+    let root = (second * second - first * third).sqrt();
+    let bend = first - 2.0 * second + third;
+    let value = |x: f64| {
+        let y = 1.0 - x;
+        let cubic = y * y * (y * b[0] + 3.0 * x * b[1]) + x * x * (3.0 * y * b[2] + x * b[3]);
+        cubic * b[0].signum()
+    };
+    let mut best = (f64::INFINITY, 0.5);
+    for x in [(first - second + root) / bend, (first - second - root) / bend] {
+        if x > 0.01 && x < 0.99 && value(x) < best.0 {
+            best = (value(x), x);
+        }
+    }
+    best.1
 }
 
 /// The polynomial in the coordinate `t` of a chart: `z = t, w = 1`, or `z = 1, w = −t` where the mask is set.
 #[inline(always)]
-fn in_chart<L: Lanes<f64>>(p: &Polynomial<L>, mirrored: &Polynomial<L>, around_infinity: M<L>) -> Polynomial<L> {
+fn in_chart<L: Lanes<f64>>(
+    p: &Polynomial<L>,
+    mirrored: &Polynomial<L>,
+    around_infinity: M<L>,
+) -> Polynomial<L> {
     let mut out = *p;
     for k in 0..11 {
         out[k] = mirrored[k].select(around_infinity, p[k]);
@@ -341,15 +364,6 @@ pub(super) fn mirrored<L: Lanes<f64>>(p: &Polynomial<L>) -> Polynomial<L> {
     out
 }
 
-#[inline(always)]
-fn horner<L: Lanes<f64>>(p: &Polynomial<L>, t: F<L>) -> F<L> {
-    let mut value = p[10];
-    for k in (0..10).rev() {
-        value = value.mul_add(t, p[k]);
-    }
-    value
-}
-
 /// The value and the slope.
 #[inline(always)]
 fn with_slope<L: Lanes<f64>>(p: &Polynomial<L>, t: F<L>) -> (F<L>, F<L>) {
@@ -360,21 +374,6 @@ fn with_slope<L: Lanes<f64>>(p: &Polynomial<L>, t: F<L>) -> (F<L>, F<L>) {
         value = value.mul_add(t, p[k]);
     }
     (value, slope)
-}
-
-/// The value and the first two derivatives.
-#[inline(always)]
-fn with_derivatives<L: Lanes<f64>>(p: &Polynomial<L>, t: F<L>) -> (F<L>, F<L>, F<L>) {
-    let mut half_bend = p[10];
-    let linear = p[10].mul_add(t, p[9]);
-    let mut slope = p[10].mul_add(t, linear);
-    let mut value = linear.mul_add(t, p[8]);
-    for k in (0..8).rev() {
-        half_bend = half_bend.mul_add(t, slope);
-        slope = slope.mul_add(t, value);
-        value = value.mul_add(t, p[k]);
-    }
-    (value, slope, half_bend + half_bend)
 }
 
 /// Newton's steps at most.
@@ -480,41 +479,4 @@ pub(super) fn count<L: Lanes<f64>>(lanes: L, p: &Polynomial<L>) -> F<L> {
         (f, g) = (g, rest);
     }
     count
-}
-
-#[cfg(test)]
-mod scratch {
-    use super::super::portable::Portable;
-    use super::*;
-
-    #[test]
-    fn planted() {
-        let lanes = Portable::<1>;
-        let _ = lanes;
-        use rand::{RngExt, SeedableRng};
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        let mut shown = 0;
-        for _ in 0..3000 {
-            let a: f64 = rng.random_range(-1.0..1.0);
-            let d: f64 = 0.02 * rng.random_range(0.0..1.0);
-            let mut p = vec![1.0];
-            let mul = |p: &mut Vec<f64>, f: &[f64]| {
-                let mut o = vec![0.0; p.len() + f.len() - 1];
-                for i in 0..p.len() { for j in 0..f.len() { o[i + j] += p[i] * f[j]; } }
-                *p = o;
-            };
-            for r in [a, a + d, -3.0, 2.0] { mul(&mut p, &[-r, 1.0]); }
-            for _ in 0..3 { mul(&mut p, &[rng.random_range(1.0..2.0), 0.4, 1.0]); }
-            let poly: Polynomial<Portable<1>> = std::array::from_fn(|k| lanes.splat(p[k]));
-            let mirrored = mirrored::<Portable<1>>(&poly);
-            let cells = isolate(lanes, Tables::get(), &poly, &mirrored);
-            if cells.count[0] != 4 && shown < 10 {
-                shown += 1;
-                let grid = grid(lanes, Tables::get(), &poly);
-                println!("{a} {d} {}", cells.count[0]);
-                let j = (a.atan() / std::f64::consts::PI * 64.0).rem_euclid(64.0) as usize;
-                for j in j.saturating_sub(1)..(j + 4).min(64) { println!("{j} {} {} {}", grid.values[j][0], grid.negative[0] >> j & 1, grid.falling[0] >> j & 1); }
-            }
-        }
-    }
 }
