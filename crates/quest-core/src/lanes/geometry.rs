@@ -111,16 +111,3 @@ pub(super) fn composed<L: Lanes<f64>>(p: &Quaternion<L>, q: &Quaternion<L>) -> Q
         d.mul_add(w, c.neg_mul_add(x, b.mul_add(y, a * z))),
     ]
 }
-
-/// `[t]× R`.
-#[inline(always)]
-pub(super) fn essential<L: Lanes<f64>>(t: &Vector3<L>, r: &Matrix3<L>) -> [F<L>; 9] {
-    let mut e = [t[0]; 9];
-    for j in 0..3 {
-        let column = cross::<L>(t, &[r[0][j], r[1][j], r[2][j]]);
-        for i in 0..3 {
-            e[3 * i + j] = column[i];
-        }
-    }
-    e
-}

@@ -60,7 +60,7 @@ pub(super) trait Task {
 
 /// Instructions that the processor is known to have.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Token {
+pub enum Token {
     /// None in particular.
     Portable,
     #[cfg(target_arch = "x86_64")]

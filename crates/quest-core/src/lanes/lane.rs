@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 pub(super) const MAX_LANES: usize = 16;
 
 /// Instructions for `COUNT` numbers of type `T` at once. A value of this type proves that the processor has them.
-pub(super) trait Lanes<T>: Copy {
+pub trait Lanes<T>: Copy {
     /// How many problems are solved at once; at most [`MAX_LANES`].
     const COUNT: usize;
     /// A number for each of the problems.
@@ -32,7 +32,7 @@ pub(super) trait WordLanes: Lanes<f64> {
 }
 
 /// A number for each problem. Arithmetic stays in its lane, so that no problem can disturb another.
-pub(super) trait Float<T>:
+pub trait Float<T>:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// A truth value for each problem.
@@ -55,7 +55,7 @@ pub(super) trait Float<T>:
 }
 
 /// A truth value for each problem.
-pub(super) trait Mask: Copy {
+pub trait Mask: Copy {
     /// Both.
     fn and(self, other: Self) -> Self;
     /// At least one of the two.

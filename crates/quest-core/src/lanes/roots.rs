@@ -282,12 +282,7 @@ impl Divided {
     /// Adds the parts of a cell with a root each.
     fn divide(&self, low: &End, high: &End, divisions: usize, cells: &mut Cells) {
         let third = (high.t - low.t) / 3.0;
-        let b = [
-            low.value,
-            low.value + third * low.slope,
-            high.value - third * high.slope,
-            high.value,
-        ];
+        let b = [low.value, low.value + third * low.slope, high.value - third * high.slope, high.value];
         let changes = b.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
         match changes {
             0 => {}
