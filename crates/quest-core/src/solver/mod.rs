@@ -4,7 +4,7 @@ mod aligned;
 mod consensus;
 mod cubics;
 pub mod eight_point;
-mod essential;
+pub(crate) mod essential;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
