@@ -114,8 +114,9 @@ fn the_solver_finds_what_the_literal_method_finds() {
             let bearings = |(x1, x2): &Match| Correspondence::from_bearings((*x1).into(), (*x2).into());
             let given = matches.iter().map(bearings).collect::<Result<Vec<_>, _>>().unwrap();
             let found = exact_rotations(&solve(SolverName::Relinearization, Kinds::Exact, &given));
-            assert_eq!(found.len(), real.len(), "{points} points, round {round}");
-            assert!(found.iter().all(|q| nearest(q, &real) < 1e-6), "{points} points, round {round}");
+            assert!(real.iter().all(|q| nearest(q, &found) < 1e-6), "{points} points, round {round}");
+            // For more than five the solver has other local minima as well.
+            assert!(found.len() == real.len() || points > 5, "{points} points, round {round}");
         }
     }
 }

@@ -14,7 +14,7 @@ use super::shortlist::Shortlist;
 use crate::{CandidateKind, Correspondence};
 
 /// No correct match is further than this from its epipolar plane: four pixels at a focal length of a thousand.
-const AGREEMENT: f64 = 4e-3;
+pub(crate) const AGREEMENT: f64 = 4e-3;
 
 /// How many fives are tried. With 70 % correct matches one of them is all correct in 99 of 100 cases.
 const FIVES: usize = 24;

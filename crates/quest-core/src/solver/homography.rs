@@ -82,6 +82,16 @@ fn homography(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
     Some(view2.inverse * Matrix3::from_row_slice(&normalised) * view1.transform)
 }
 
+/// The motions of the plane that explains all matches to `tolerance` (radians), if there is one.
+pub(crate) fn motions_of_plane(matches: &[Correspondence], tolerance: f64) -> [Option<Motion>; 2] {
+    let Some(h) = homography(matches) else { return [None; 2] };
+    let explains = |m: &Correspondence| {
+        let x2 = h * m.bearing1();
+        x2.cross(m.bearing2()).norm() < tolerance * x2.norm()
+    };
+    if matches.iter().all(explains) { motions(&h) } else { [None; 2] }
+}
+
 /// A middle singular value this small against the largest one leaves no digit of its direction.
 const RANK_ONE: f64 = 1e-7;
 

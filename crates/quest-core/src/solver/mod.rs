@@ -12,6 +12,7 @@ pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
+mod minor_values;
 mod moments;
 mod motion;
 pub mod nister;
@@ -111,7 +112,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Relinearization,

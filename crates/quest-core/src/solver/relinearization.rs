@@ -18,32 +18,39 @@
 //! divided by: with that, all is homogeneous. The minors of [`quaternion`](crate::quaternion) that the paper does not have
 //! leave no more directions `v_i` than there are solutions, so that `W_0` is square. Then:
 //! - *Five matches*, 20 directions: `D̄` is 465 × 210, and its null space comes from an elimination of 15 × 35 (`moments.rs`).
-//! - *More*: the six combinations of all constraints that the matches determine best have 35 minors, which leave two directions
-//!   in the least-squares sense. `D̄` is 465 × 3, of rank one: `W_1 W_0⁻¹` has the roots of one quadratic equation as its
-//!   eigenvalues. Both solutions are refined over all matches; where they do not fit, the motion on which most matches
-//!   agree is added.
+//! - *More*: the six combinations of all constraints that the matches determine best have 35 minors (`minor_values.rs`). The paper
+//!   has two solutions here. With noise the minors leave no direction quite open, and the four shortest hold the solutions
+//!   better than the two shortest: `D̄` is 465 × 10, its four shortest directions in place of null vectors make two
+//!   solutions and two that mean nothing, and all are refined over all matches. Points of a plane leave more directions than
+//!   that: where a homography explains the matches its two motions are refined as well. Where nothing fits, the motion on
+//!   which most matches agree is added (`consensus.rs`).
 //!
 //! **Degenerate**: fewer than five independent constraints; an exact pure rotation. With little parallax all solutions run
 //! together and the eigenvalues lose their digits: at a parallax of 1e-7 next to none of the true poses is lost, at 1e-8 one
 //! in twenty.
 //!
-//! **Solutions**: twenty rotations for five matches and two for more, counting complex ones, a pair of which is one candidate;
-//! and the rotation-only candidate.
+//! **Solutions**: twenty rotations for five matches, counting complex ones, a pair of which is one candidate; for more two, and
+//! other local minima that were found beside them; and the rotation-only candidate.
 
-use nalgebra::{Complex, ComplexField, Matrix3, Matrix4, Quaternion, UnitQuaternion};
+use nalgebra::{ComplexField, Quaternion, UnitQuaternion};
 
 use super::aligned::{Alignment, Gram};
+use super::consensus::{self, AGREEMENT};
 use super::essential::real_part;
+use super::homography::motions_of_plane;
+use super::minor_values::{minors_at_points, monomials};
 use super::moments::Pencil;
 use super::motion::Motion;
 use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use super::twenty::from_five;
-use super::{Kinds, PoseSolver, consensus, refining};
+use super::{Kinds, PoseSolver, refining};
+use crate::algebra::eigenvalues::Hessenberg;
+use crate::algebra::elimination;
 use crate::algebra::monomials::{position, sum};
 use crate::algebra::singular::shortest_directions;
+use crate::quaternion::bilinear;
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
-use crate::quaternion::{bilinear, fifteen_minors_without_q, minors_with_q};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
@@ -63,25 +70,20 @@ impl PoseSolver for Relinearization {
     }
 }
 
-/// The local minima over more than five matches next to the two solutions.
+/// The local minima over more than five matches next to the solutions.
 fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(alignment, matches);
-    let [leading @ .., _, _, _] = gram.principal_basis(matches)?;
-    let rows = minors(&leading.map(|row| bilinear(&alignment.constraint(&row))));
+    let [leading @ .., _, _, _] = Gram::new(alignment, matches).principal_basis(matches)?;
+    let rows = minors_at_points(&leading.map(|row| bilinear(&alignment.constraint(&row))));
     let mut starts = Shortlist::new();
-    for (kind, q_21) in two_solutions(rows).into_iter().flatten() {
+    for (kind, q_21) in solutions(rows).into_iter().flatten() {
         starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
     }
-    let mut refined = starts.refined(&gram, matches);
-    consensus::add(&mut refined, matches, motions_of_five);
-    Ok(refined)
-}
-
-/// The 35 minors of `[q, M_1 q, …, M_6 q]`.
-fn minors(m: &[Matrix4<f64>; 6]) -> [Quartic; 35] {
-    let with_q: [Quartic; 20] = minors_with_q(m);
-    let without_q = fifteen_minors_without_q(m);
-    std::array::from_fn(|k| if k < 20 { with_q[k] } else { without_q[k - 20] })
+    for motion in motions_of_plane(matches, AGREEMENT).into_iter().flatten() {
+        starts.push(CandidateKind::Exact, motion);
+    }
+    let mut minima = starts.minimised(matches);
+    consensus::add(&mut minima, matches, motions_of_five);
+    Ok(minima)
 }
 
 /// The index of a monomial of degree 8 in lexicographic order.
@@ -115,22 +117,68 @@ const RELATIONS: [[u8; 4]; 465] = {
     relations
 };
 
-/// The rotations of the two solutions of equations of which these are the coefficients.
-fn two_solutions(mut rows: [Quartic; 35]) -> [Option<(CandidateKind, UnitQuaternion<f64>)>; 2] {
-    let [v1, v2]: [Quartic; 2] = shortest_directions(&mut rows);
-    let [a, b, c] = binary_quadratic(&v1, &v2);
-    // a s1² + b s1 s2 + c s2² = 0.
-    let discriminant = b * b - 4.0 * a * c;
-    if discriminant < 0.0 {
-        let (s1, s2) = (Complex::new(-b, (-discriminant).sqrt()), Complex::from(2.0 * a));
-        let x = std::array::from_fn(|k| s1 * v1[k] + s2 * v2[k]);
-        return [rotation(CandidateKind::FromComplex, real_part(quaternion(&x))), None];
+/// `(q·q)²` as a form on `x`.
+const NORM: Quartic = {
+    let mut form = [0.0; 35];
+    let mut k = 0;
+    while k < 35 {
+        let [a, b, c, d] = MONOMIALS[k];
+        if a % 2 == 0 && b % 2 == 0 && c % 2 == 0 && d % 2 == 0 {
+            form[k] = if a == 4 || b == 4 || c == 4 || d == 4 { 1.0 } else { 2.0 };
+        }
+        k += 1;
     }
-    let t = -0.5 * (b + discriminant.sqrt().copysign(b));
-    [(t, a), (c, t)].map(|(s1, s2)| {
-        let x = std::array::from_fn(|k| s1 * v1[k] + s2 * v2[k]);
-        rotation(CandidateKind::Exact, quaternion::<f64>(&x))
+    form
+};
+
+/// A generic `s_l`.
+const FORM: [f64; 4] = [0.53, -0.86, 0.71, 0.37];
+
+/// `PAIR[i][j]`: the place of `s_i s_j` in `y`.
+const PAIR: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]];
+
+/// The rotations at which all minors, rows of values at the points, vanish, and as many others where they do not.
+fn solutions(mut rows: [[f64; 35]; 35]) -> [Option<(CandidateKind, UnitQuaternion<f64>)>; 4] {
+    let v = shortest_directions::<35, 35, 4>(&mut rows).map(|weights| monomials(&weights));
+    let w: [[f64; 10]; 4] = shortest_directions(&mut relinearized(&v));
+    let norm = v.map(|v| v.iter().zip(NORM).map(|(x, c)| x * c).sum::<f64>());
+    // Σ_j f_j s_j s_i by the null vectors.
+    let row = |f: &[f64; 4], i: usize, k: usize| (0..4).map(|j| f[j] * w[k][PAIR[i][j]]).sum::<f64>();
+    let w0: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|k| row(&norm, i, k)));
+    let mut pencil: [[f64; 8]; 4] =
+        std::array::from_fn(|i| std::array::from_fn(|k| if k < 4 { w0[i][k] } else { row(&FORM, i, k - 4) }));
+    if elimination::reduce(&mut pencil, 0) == 0.0 {
+        return [None; 4];
+    }
+    let action = Hessenberg::<4>::new(pencil.map(|row| std::array::from_fn(|k| row[4 + k])));
+    let Some((action, values)) = action.and_then(|a| a.eigenvalues().map(|values| (a, values))) else {
+        return [None; 4];
+    };
+    values.map(|value| {
+        if value.im == 0.0 {
+            rotation(CandidateKind::Exact, quaternion(&x(&v, &w0, &action.eigenvector(value.re)?)))
+        } else if value.im > 0.0 {
+            let q = quaternion(&x(&v, &w0, &action.eigenvector(value)?));
+            rotation(CandidateKind::FromComplex, real_part(q))
+        } else {
+            None
+        }
     })
+}
+
+/// `x = Σ s_i v_i` with `s = W_0 r`.
+fn x<T: ComplexField<RealField = f64> + Copy>(v: &[Quartic; 4], w0: &[[f64; 4]; 4], r: &[T; 4]) -> [T; 35] {
+    let mut x = [T::zero(); 35];
+    for (v, row) in v.iter().zip(w0) {
+        let mut s = T::zero();
+        for (r, w) in r.iter().zip(row) {
+            s += r.scale(*w);
+        }
+        for (x, v) in x.iter_mut().zip(v) {
+            *x += s.scale(*v);
+        }
+    }
+    x
 }
 
 fn rotation(kind: CandidateKind, [w, x, y, z]: [f64; 4]) -> Option<(CandidateKind, UnitQuaternion<f64>)> {
@@ -138,29 +186,22 @@ fn rotation(kind: CandidateKind, [w, x, y, z]: [f64; 4]) -> Option<(CandidateKin
     q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
 }
 
-/// `D y = 0` for `y = (s1², s1 s2, s2²)`: the one equation that the 465 are multiples of, in the least-squares sense.
-fn binary_quadratic(v1: &Quartic, v2: &Quartic) -> [f64; 3] {
-    let mut d_squared = [[0.0; 3]; 3];
-    for [a, b, c, d] in RELATIONS.map(|relation| relation.map(usize::from)) {
-        let row = [
-            v1[a] * v1[b] - v1[c] * v1[d],
-            v1[a] * v2[b] + v2[a] * v1[b] - v1[c] * v2[d] - v2[c] * v1[d],
-            v2[a] * v2[b] - v2[c] * v2[d],
-        ];
-        for i in 0..3 {
-            for j in 0..3 {
-                d_squared[i][j] += row[i] * row[j];
+/// `D̄` for four directions.
+fn relinearized(v: &[Quartic; 4]) -> [[f64; 10]; RELATIONS.len()] {
+    RELATIONS.map(|relation| {
+        let [a, b, c, d] = relation.map(usize::from);
+        let mut row = [0.0; 10];
+        for i in 0..4 {
+            for j in i..4 {
+                row[PAIR[i][j]] = if i == j {
+                    v[i][a] * v[i][b] - v[i][c] * v[i][d]
+                } else {
+                    v[i][a] * v[j][b] + v[j][a] * v[i][b] - v[i][c] * v[j][d] - v[j][c] * v[i][d]
+                };
             }
         }
-    }
-    // Powers of a matrix of nearly rank one: all columns become its image.
-    let mut m = Matrix3::from(d_squared);
-    for _ in 0..3 {
-        m /= m.norm();
-        m *= m;
-    }
-    let longest = m.column(m.diagonal().imax());
-    [longest[0], longest[1], longest[2]]
+        row
+    })
 }
 
 /// The quaternion, of any scale, from the values of the quartic monomials: the row of the largest fourth power.
@@ -190,6 +231,7 @@ fn quaternion<T: ComplexField<RealField = f64> + Copy>(x: &[T; 35]) -> [T; 4] {
 mod tests {
     use super::*;
     use crate::simulate::{Scene, SceneOptions};
+    use nalgebra::{SMatrix, SVector};
 
     const SEED: u64 = 110;
 
@@ -216,19 +258,16 @@ mod tests {
                 let options = SceneOptions { points, ..SceneOptions::default() };
                 let scene = Scene::generate(&options, SEED, index).unwrap();
                 let rows = rows(&Alignment::new(&scene.matches), &scene.matches);
-                let directions: [Quartic; 2] = shortest_directions(&mut rows.clone());
+                let directions = shortest_directions::<35, 35, 2>(&mut rows.clone()).map(|w| monomials(&w));
+                let directions = SMatrix::<f64, 35, 2>::from_fn(|i, j| directions[j][i]);
+                let inverse = directions.pseudo_inverse(0.0).unwrap();
                 let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
                 for q in [truth.q_21, truth.twisted().q_21] {
-                    let mut x = veronese(&q);
-                    for direction in &directions {
-                        let dot: f64 = x.iter().zip(direction).map(|(a, b)| a * b).sum();
-                        for (a, b) in x.iter_mut().zip(direction) {
-                            *a -= dot * b;
-                        }
-                    }
+                    let x = SVector::from(veronese(&q));
                     // 1e-15 over the 33rd singular value, which is above 1e-9 of the first.
-                    assert!(x.iter().all(|a| a.abs() < 1e-6), "{points} points, scene {index}");
-                    let found = two_solutions(rows);
+                    let outside = x - directions * (inverse * x);
+                    assert!(outside.amax() < 1e-6, "{points} points, scene {index}");
+                    let found = solutions(rows);
                     let nearest = found.iter().flatten().map(|(_, p)| p.angle_to(&q)).fold(9.0, f64::min);
                     assert!(nearest < 1e-6, "{points} points, scene {index}: {nearest:e}");
                 }
@@ -236,8 +275,8 @@ mod tests {
         }
     }
 
-    fn rows(alignment: &Alignment, matches: &[Correspondence]) -> [Quartic; 35] {
+    fn rows(alignment: &Alignment, matches: &[Correspondence]) -> [[f64; 35]; 35] {
         let [leading @ .., _, _, _] = Gram::new(alignment, matches).principal_basis(matches).unwrap();
-        minors(&leading.map(|row| bilinear(&alignment.constraint(&row))))
+        minors_at_points(&leading.map(|row| bilinear(&alignment.constraint(&row))))
     }
 }

@@ -117,8 +117,13 @@ impl Shortlist {
         let cost =
             |item: &Option<(CandidateKind, Motion)>| item.map_or(0.0, |(_, motion)| gram.cost(&motion));
         coarse.items[..coarse.len].sort_unstable_by(|x, y| cost(x).total_cmp(&cost(y)));
+        coarse.minimised(matches)
+    }
+
+    /// The same of few motions that are near their minima.
+    pub(crate) fn minimised(&self, matches: &[Correspondence]) -> Self {
         let mut fine = Self { same: SAME_MINIMUM, ..Self::new() };
-        for (kind, motion) in coarse.iter() {
+        for (kind, motion) in self.iter() {
             let mut motion = *motion;
             motion.minimise_sampson(matches, f64::INFINITY, 30);
             fine.push_pair(*kind, motion);
