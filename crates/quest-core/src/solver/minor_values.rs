@@ -24,7 +24,7 @@ const POINTS: [[f64; 4]; 35] = {
         let mut i = 0;
         while i < 4 {
             let multiple = STEPS[i] * (k + 1) as f64;
-            points[k][i] = 2.0 * (multiple - (multiple as u32) as f64) - 1.0;
+            points[k][i] = 2.0 * (multiple % 1.0) - 1.0;
             i += 1;
         }
         k += 1;
