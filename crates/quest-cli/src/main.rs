@@ -1,14 +1,19 @@
-//! `quest-cli`: candidate poses from matched points.
+//! `quest-cli`: camera poses from matched points.
 //!
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+mod estimate;
+mod estimate_table;
+mod input;
 mod options;
+mod progress;
 mod rows;
 mod solve;
 mod solvers;
 mod table;
 mod words;
+mod writer;
 
 use std::process::ExitCode;
 
@@ -17,6 +22,7 @@ use clap::{Parser, Subcommand};
 const EXAMPLES: &str = "\
 Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
+  quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli solve --format json pair.json | jq     the same for programs
   quest-cli solvers                                the solvers to choose from
 
@@ -33,6 +39,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Solve(Box<solve::Arguments>),
+    Estimate(Box<estimate::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -49,11 +56,14 @@ enum Failure {
     Read(#[from] quest_io::ReadError),
     #[error(transparent)]
     Write(#[from] quest_io::WriteError),
+    #[error("{0}")]
+    Arguments(String),
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
+        Command::Estimate(arguments) => estimate::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

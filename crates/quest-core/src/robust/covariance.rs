@@ -25,7 +25,12 @@ const EFFICIENCY: f64 = 1.10;
 const STEP: f64 = 1e-5;
 
 /// The covariance of the five parameters of a motion, `sigma` the noise in pixels.
-fn of_motion(observations: &Observations, motion: &Motion, inliers: &[u32], sigma: f64) -> Option<Matrix5<f64>> {
+fn of_motion(
+    observations: &Observations,
+    motion: &Motion,
+    inliers: &[u32],
+    sigma: f64,
+) -> Option<Matrix5<f64>> {
     let _ = (PARAMETERS, GemanMcClure::new(SCALE * sigma));
     let subset = Subset::new(observations, inliers);
     let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));

@@ -27,6 +27,7 @@
 //! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
 //! as fisheye cameras do, the same angle. Residuals are Sampson errors in pixels of the focal lengths.
 
+mod batch;
 mod covariance;
 mod estimate;
 mod length;
@@ -52,6 +53,7 @@ mod verdict;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+pub use batch::{Problem, estimate_batch};
 pub use estimate::{Estimate, Evidence, Model, RunnerUp};
 pub use options::{EstimateError, KnownDirection, Options, Priors};
 

@@ -160,7 +160,11 @@ impl Priors<'_> {
                 }
             }
             if tolerance.is_nan() || tolerance < 0.0 {
-                return refuse("tolerance of the known direction", tolerance, "a number that is not negative");
+                return refuse(
+                    "tolerance of the known direction",
+                    tolerance,
+                    "a number that is not negative",
+                );
             }
         }
         Ok(())

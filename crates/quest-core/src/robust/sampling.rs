@@ -97,8 +97,7 @@ impl Sampler {
 impl Prosac {
     fn new(ranked: Vec<usize>, size: usize) -> Self {
         let n = ranked.len();
-        let average =
-            (0..size).fold(PROSAC_CONVERGENCE, |t, i| t * (size - i) as f64 / (n - i) as f64);
+        let average = (0..size).fold(PROSAC_CONVERGENCE, |t, i| t * (size - i) as f64 / (n - i) as f64);
         Self { ranked, pool: size, average, next: 1.0, iteration: 0.0 }
     }
 
@@ -151,7 +150,9 @@ mod tests {
 
     fn drawn(sampler: &mut Sampler, count: usize) -> Vec<Vec<usize>> {
         let mut sample = [0; MAX_SAMPLE];
-        (0..count).map_while(|_| sampler.draw(&mut sample).map(|()| sample[..sampler.size].to_vec())).collect()
+        (0..count)
+            .map_while(|_| sampler.draw(&mut sample).map(|()| sample[..sampler.size].to_vec()))
+            .collect()
     }
 
     #[test]

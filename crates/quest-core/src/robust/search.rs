@@ -33,6 +33,13 @@ const MATCHES: usize = 200;
 /// Where the loss of the local optimisation levels off, in units of the threshold.
 const WIDTH: f64 = 4.0;
 
+/// With fewer matches every hypothesis is refined and kept.
+pub(super) const MANY: usize = 10;
+
+/// Costs closer than this are equal: five matches are fitted exactly by every solution. The smaller rotation then comes
+/// first, as among candidates.
+const EQUAL: f64 = 1e-3;
+
 /// What stops the search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
@@ -53,6 +60,8 @@ pub(super) struct Search<'a> {
     best_hypothesis: f32,
     /// The best pose.
     pub(super) best: Option<Scored>,
+    /// Of few matches, every pose that was found, refined.
+    pub(super) all: Vec<Scored>,
     /// Samples drawn.
     pub(super) iterations: usize,
     hypotheses: Vec<Matrix3<f64>>,
@@ -74,6 +83,7 @@ impl<'a> Search<'a> {
             poses: PoseScorer::new(observations, threshold),
             best_hypothesis: observations.len() as f32,
             best: None,
+            all: Vec::new(),
             iterations: 0,
             hypotheses: Vec::new(),
         }
@@ -113,7 +123,11 @@ impl<'a> Search<'a> {
         let needed = self.best.map_or(f64::INFINITY, |best| {
             stopping::iterations(best.support, self.observations.len(), size, limits.confidence)
         });
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and is positive")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates, and is positive"
+        )]
         let needed = needed.ceil() as usize;
         needed.max(limits.min_iterations).min(limits.max_iterations)
     }
@@ -140,6 +154,9 @@ impl<'a> Search<'a> {
 
     /// Scores a hypothesis, and refines it where it is the best so far.
     fn consider(&mut self, e: &Matrix3<f64>) {
+        if self.observations.len() < MANY {
+            return self.consider_one_of_few(e);
+        }
         if self.scorer.score(e, self.best_hypothesis).is_none() {
             return;
         }
@@ -150,6 +167,17 @@ impl<'a> Search<'a> {
             self.best_hypothesis = cost;
             let optimised = self.optimise(scored);
             self.keep(optimised);
+        }
+    }
+
+    /// Of few matches every hypothesis is refined: the scores hardly tell them apart.
+    fn consider_one_of_few(&mut self, e: &Matrix3<f64>) {
+        let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
+        let optimised = self.optimise(scored);
+        self.all.push(optimised);
+        let order = |s: &Scored| ((s.cost / EQUAL).round(), s.motion.q_21.angle());
+        if self.best.is_none_or(|best| order(&optimised) < order(&best)) {
+            self.best = Some(optimised);
         }
     }
 

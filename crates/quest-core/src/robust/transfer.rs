@@ -132,9 +132,8 @@ pub(super) fn refine_homography(
     loss: &impl Loss,
     max_steps: usize,
 ) -> f64 {
-    let row = |slope: &Vector3<f64>, w: &Whitened| {
-        SVector::<f64, 9>::from_fn(|k, _| slope[k / 3] * w.x1[k % 3])
-    };
+    let row =
+        |slope: &Vector3<f64>, w: &Whitened| SVector::<f64, 9>::from_fn(|k, _| slope[k / 3] * w.x1[k % 3]);
     *h /= h.norm();
     minimise(
         h,

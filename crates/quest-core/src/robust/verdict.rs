@@ -15,15 +15,12 @@ use super::plane::{self, Plane};
 use super::polish::{FEWEST, Polished, SCALE, polish};
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
-use super::search::Search;
+use super::search::{MANY, Search};
 use super::significance::is_significant;
 use super::transfer::square_error;
 use crate::RelativePose;
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
-
-/// With fewer matches chance cannot be told from truth, and the best pose is returned as it is.
-const JUDGED: usize = 10;
 
 /// Poses closer than this in rotation and in the direction of translation (radians) are the same answer.
 const SAME: f64 = 0.02;
@@ -50,6 +47,7 @@ pub(super) fn conclude(
     rng: &mut ChaCha8Rng,
 ) -> Result<Estimate, EstimateError> {
     let iterations = search.iterations;
+    let of_few = std::mem::take(&mut search.all);
     let poses = &mut search.poses;
     let mut polished = polish(poses, best.motion);
     let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
@@ -57,11 +55,12 @@ pub(super) fn conclude(
     replace(poses, &mut polished, &mut others);
     poses.score(polished.scored.motion, poses.threshold);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
-    if observations.len() >= JUDGED && !is_significant(poses, &polished.scored.motion, iterations) {
+    // Of fewer matches chance cannot be told from truth, and the best pose is returned as it is.
+    if observations.len() >= MANY && !is_significant(poses, &polished.scored.motion, iterations) {
         return Err(EstimateError::NoPose { inliers, matches: observations.len() });
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
-    Ok(assemble(poses, &polished, &others, &verdict, iterations))
+    Ok(assemble(poses, &polished, &others, &of_few, &verdict, iterations))
 }
 
 /// One of the motions of a plane: as its homography has it, and refined as any other motion.
@@ -103,7 +102,8 @@ fn is_same(a: &Motion, b: &Motion) -> bool {
 /// Puts an alternative that explains the matches better in the place of the pose, which becomes an alternative itself.
 fn replace(poses: &mut PoseScorer, polished: &mut Polished, others: &mut [Alternative]) {
     let better = |a: &&mut Alternative| {
-        a.refined.cost < polished.scored.cost - CLEARLY && !is_same(&a.refined.motion, &polished.scored.motion)
+        a.refined.cost < polished.scored.cost - CLEARLY
+            && !is_same(&a.refined.motion, &polished.scored.motion)
     };
     let best = others.iter_mut().filter(better).min_by(|a, b| a.refined.cost.total_cmp(&b.refined.cost));
     if let Some(best) = best {
@@ -115,6 +115,7 @@ fn assemble(
     poses: &mut PoseScorer,
     polished: &Polished,
     others: &[Alternative],
+    of_few: &[Scored],
     verdict: &Verdict,
     iterations: usize,
 ) -> Estimate {
@@ -155,7 +156,12 @@ fn assemble(
         inliers: mask,
         score: share(&scored, observations),
         iterations,
-        runner_up: (model == Model::Planar).then(|| runner_up(poses, others, &motion, sigma)).flatten(),
+        runner_up: match model {
+            Model::PureRotation => None,
+            _ if observations.len() < MANY => second_of_few(poses, of_few, &motion, sigma),
+            Model::Planar => other_of_plane(poses, others, &motion, sigma),
+            _ => None,
+        },
         evidence: verdict.evidence,
         noise_px: sigma,
     }
@@ -182,25 +188,33 @@ fn share(scored: &Scored, observations: &Observations) -> f64 {
 }
 
 /// The other motion of the plane, where it is feasible.
-fn runner_up(
+fn other_of_plane(
     poses: &mut PoseScorer,
     others: &[Alternative],
     best: &Motion,
     sigma: f64,
 ) -> Option<RunnerUp> {
-    let observations = poses.observations;
     poses.score(*best, poses.threshold);
     let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
     let different = others.iter().filter(|a| !is_same(&a.of_plane.motion, best));
     let other = different.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost))?;
-    let scored = poses.score(other.of_plane.motion, poses.threshold);
-    if (poses.inliers.len() as f64) < fewest {
-        return None;
-    }
-    let size = length(observations, &scored.motion, &poses.inliers, sigma);
-    Some(RunnerUp {
+    let other = runner_up(poses, other.of_plane.motion, sigma);
+    (other.inlier_count as f64 >= fewest).then_some(other)
+}
+
+/// The next best of the poses that few matches have.
+fn second_of_few(poses: &mut PoseScorer, all: &[Scored], best: &Motion, sigma: f64) -> Option<RunnerUp> {
+    let different = all.iter().filter(|s| !is_same(&s.motion, best));
+    let other = different.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    Some(runner_up(poses, other.motion, sigma))
+}
+
+fn runner_up(poses: &mut PoseScorer, motion: Motion, sigma: f64) -> RunnerUp {
+    let scored = poses.score(motion, poses.threshold);
+    let size = length(poses.observations, &scored.motion, &poses.inliers, sigma);
+    RunnerUp {
         pose: with_length(&scored.motion, size),
-        score: share(&scored, observations),
+        score: share(&scored, poses.observations),
         inlier_count: poses.inliers.len(),
-    })
+    }
 }

@@ -14,6 +14,7 @@
 mod camera;
 mod metrics;
 mod options;
+mod outliers;
 mod sampling;
 mod scene;
 

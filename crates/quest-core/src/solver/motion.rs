@@ -226,7 +226,11 @@ pub(crate) fn tangent_basis(t: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// The step `−(H + damping · diag H)⁻¹ g`, where it exists.
-pub(crate) fn damped_step(hessian: &Matrix5<f64>, gradient: &Vector5<f64>, damping: f64) -> Option<Vector5<f64>> {
+pub(crate) fn damped_step(
+    hessian: &Matrix5<f64>,
+    gradient: &Vector5<f64>,
+    damping: f64,
+) -> Option<Vector5<f64>> {
     let mut damped = *hessian;
     for k in 0..5 {
         damped[(k, k)] *= 1.0 + damping;
