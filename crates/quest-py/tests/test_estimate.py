@@ -3,8 +3,10 @@
 import copy
 import json
 import pickle
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 import quest_pose as qp
 from scenes import Array, K, Scene, make_scene
@@ -12,7 +14,9 @@ from scenes import Array, K, Scene, make_scene
 CAMERA = qp.Camera("PINHOLE", [1060, 1060, 514, 384], width=1024, height=768)
 
 
-def with_outliers(scene: Scene, share: float, seed: int, noise: float = 0.3) -> tuple[Array, Array, Array]:
+def with_outliers(
+    scene: Scene, share: float, seed: int, noise: float = 0.3
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Pixels of both views, a share of them false, and which are true."""
     rng = np.random.default_rng(seed)
     u1 = scene.u1 + rng.normal(0, noise, scene.u1.shape)
@@ -91,8 +95,7 @@ def test_points_without_cameras() -> None:
 def test_priors() -> None:
     scene = make_scene(1, 200)
     u1, u2, true = with_outliers(scene, 0.7, 2)
-    few = {"min_iterations": 0, "max_iterations": 15}
-    est = qp.estimate(u1, u2, K, scores=true, **few)
+    est = qp.estimate(u1, u2, K, scores=true, min_iterations=0, max_iterations=15)
     assert rotation_error(est.R, scene.R) < 0.5
     est = qp.estimate(u1, u2, K, initial_pose=(scene.R, scene.t), min_iterations=0, max_iterations=1)
     assert rotation_error(est.R, scene.R) < 0.5
@@ -136,13 +139,14 @@ def test_values() -> None:
     few = make_scene(1, 6)
     est = qp.estimate(few.u1, few.u2, K)
     assert est.runner_up is not None
-    for value in [est, est.runner_up]:
+    values: list[Any] = [est, est.runner_up]
+    for value in values:
         for other in [copy.deepcopy(value), pickle.loads(pickle.dumps(value))]:
             assert other == value
             assert repr(other) == repr(value)
         assert json.loads(json.dumps(value.to_dict(), allow_nan=False))["t_21"] == value.t.tolist()
         with pytest.raises(AttributeError):
-            value.score = 1.0  # type: ignore[misc]
+            value.score = 1.0
     keys = "model q_21 R_21 t_21 parallax covariance inliers inlier_count score iterations runner_up evidence noise_px"
     assert list(est.to_dict()) == keys.split()
 
@@ -180,7 +184,8 @@ def test_batch() -> None:
 
 def test_bad_batches() -> None:
     x1, x2, offsets = batch()
-    for bad in [[0, 5], [*offsets[:-1], 10_000], [0, 50, 20, len(x1)], [0.5, len(x1)], []]:
+    offers: list[list[float]] = [[0, 5], [*offsets[:-1], 10_000], [0, 50, 20, len(x1)], [0.5, len(x1)], []]
+    for bad in offers:
         with pytest.raises(qp.ShapeMismatch, match="offsets"):
             qp.estimate_batch(x1, x2, bad, K)
     with pytest.raises(qp.ShapeMismatch, match="cameras1 has 3"):

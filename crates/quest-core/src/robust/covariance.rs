@@ -69,7 +69,8 @@ pub(super) fn of_pose(
     let along = motion.direction * motion.direction.transpose() * size.variance;
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += along;
-    Some(covariance)
+    // Rounding must not show which triangle it was computed from.
+    Some((covariance + covariance.transpose()) * 0.5)
 }
 
 /// The covariance of `(ω, t_21)` where there is no translation: that of the rotation alone, and for a translation of which
