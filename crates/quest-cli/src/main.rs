@@ -1,15 +1,20 @@
-//! `quest-cli`: candidate poses from matched points.
+//! `quest-cli`: camera poses from matched points.
 //!
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+mod estimate;
+mod estimate_table;
+mod input;
 mod options;
+mod progress;
 mod rows;
 mod simulate;
 mod solve;
 mod solvers;
 mod table;
 mod words;
+mod writer;
 
 use std::process::ExitCode;
 
@@ -18,6 +23,7 @@ use clap::{Parser, Subcommand};
 const EXAMPLES: &str = "\
 Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
+  quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli solve --format json pair.json | jq     the same for programs
   quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
   quest-cli solvers                                the solvers to choose from
@@ -35,6 +41,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Solve(Box<solve::Arguments>),
+    Estimate(Box<estimate::Arguments>),
     Simulate(Box<simulate::Arguments>),
     Solvers(solvers::Arguments),
 }
@@ -64,6 +71,7 @@ enum Failure {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
+        Command::Estimate(arguments) => estimate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };

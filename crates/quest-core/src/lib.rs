@@ -61,6 +61,7 @@ pub mod feasibility;
 pub mod lanes;
 pub mod pose;
 pub mod quaternion;
+pub mod robust;
 pub mod simulate;
 pub mod solver;
 pub mod structure;

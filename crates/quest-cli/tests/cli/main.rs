@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod candidates;
+mod estimate;
 mod formats;
 mod output;
 mod readme;
