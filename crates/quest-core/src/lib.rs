@@ -60,6 +60,7 @@ mod degeneracy;
 pub mod feasibility;
 pub mod pose;
 pub mod quaternion;
+pub mod servo;
 pub mod simulate;
 pub mod solver;
 pub mod structure;

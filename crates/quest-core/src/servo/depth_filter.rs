@@ -1,0 +1,371 @@
+//! The estimator of the loop: candidates start it, a filter on the goal's inverse depths carries it on.
+//!
+//! 1. The first image gives candidates (`source`), each with its inverse goal depths: the hypotheses.
+//! 2. Every further image is fitted by every hypothesis (`fit.rs`). What a wrong one calls the goal's depths does not fit
+//!    the images from elsewhere: its costs add up, and it is dropped. The one with the smallest sum gives the pose.
+//! 3. A pose passes the gate where its cost is what noise explains, and where the camera can have come there since the last one.
+//!    Otherwise features are left out one at a time, then new candidates are tried with the old depths.
+//! 4. An accepted image adds to the depths, with a small weight: the noise of the goal image is in all of them.
+//!
+//! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](super::PerFrame).
+
+use super::estimate::{Estimate, HoldReason, PoseEstimator};
+use super::fit::{Fitted, Known, Plane, Workspace};
+use super::reference::DepthReference;
+use super::source::PoseSource;
+use crate::{CandidateKind, Candidates, Correspondence, RelativePose};
+
+/// How many answers to the first image are kept apart.
+const MAX_HYPOTHESES: usize = 8;
+/// A hypothesis with so much more χ² than the best is dropped: odds of 1 to 3e6.
+const HOPELESS: f64 = 30.0;
+/// No single image counts for more than this: the odds of 1 to 300,000 that a false one may cost the truth.
+const MOST_OF_ONE_IMAGE: f64 = 25.0;
+/// How much inverse depths differ from their mean, before anything is known of them.
+const SPREAD: f64 = 0.5;
+
+/// What is known of the images and the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterOptions {
+    /// Standard deviation of the coordinates in the current image on the plane z = 1: pixels divided by the focal length.
+    pub noise: f64,
+    /// The same of the goal image: smaller by √k where k goal images are averaged.
+    pub goal_noise: f64,
+    /// Fewer features than this are not acted on.
+    pub min_features: usize,
+    /// The weight of one image in the goal's depths.
+    pub frame_weight: f64,
+    /// How many standard deviations an image, a feature or a motion may be off.
+    pub gate: f64,
+    /// The largest rotation from one image to the next, in radians.
+    pub largest_turn: f64,
+    /// The largest change of t from one image to the next, in the unit of the goal's depths.
+    pub largest_move: f64,
+    /// After so many images without a pose the candidates are asked again.
+    pub patience: usize,
+    /// For a robot that moves on a plane with a level camera: how exactly.
+    pub plane: Option<Plane>,
+}
+
+impl Default for FilterOptions {
+    /// Half a pixel at a focal length of 500, a free camera.
+    fn default() -> Self {
+        Self {
+            noise: 1e-3,
+            goal_noise: 1e-3,
+            min_features: 5,
+            frame_weight: 0.05,
+            gate: 5.0,
+            largest_turn: 0.1,
+            largest_move: 0.1,
+            patience: 5,
+            plane: None,
+        }
+    }
+}
+
+/// One answer to the first image, and what has become of it.
+#[derive(Clone, Debug)]
+struct Hypothesis {
+    reference: DepthReference,
+    pose: RelativePose,
+    /// The sum of its costs.
+    score: f64,
+}
+
+/// The estimator described at the head of the module.
+#[derive(Clone, Debug)]
+pub struct DepthFilter<S> {
+    goal: Vec<[f64; 2]>,
+    source: S,
+    options: FilterOptions,
+    sigma: f64,
+    /// The first `count` are alive, the best first.
+    hypotheses: Vec<Hypothesis>,
+    count: usize,
+    spare: Hypothesis,
+    workspace: Workspace,
+    frame: Vec<Option<[f64; 2]>>,
+    matches: Vec<Correspondence>,
+    candidates: Candidates,
+    /// Images since the last accepted pose.
+    missed: usize,
+}
+
+impl<S: PoseSource> DepthFilter<S> {
+    /// The estimator for this goal image: its features on the plane z = 1.
+    #[must_use]
+    pub fn new(goal: &[[f64; 2]], source: S, options: FilterOptions) -> Self {
+        let n = goal.len();
+        let empty = Hypothesis {
+            reference: DepthReference::flat(n, SPREAD),
+            pose: RelativePose::identity(),
+            score: 0.0,
+        };
+        Self {
+            goal: goal.to_vec(),
+            source,
+            options,
+            sigma: options.noise.hypot(options.goal_noise),
+            hypotheses: vec![empty.clone(); MAX_HYPOTHESES],
+            count: 0,
+            spare: empty,
+            workspace: Workspace::new(n),
+            frame: vec![None; n],
+            matches: Vec::with_capacity(n),
+            candidates: Candidates::new(),
+            missed: 0,
+        }
+    }
+
+    /// Starts with goal depths that are known, in any unit: from a depth camera or an earlier run. `precision` is their
+    /// relative standard deviation. `pose` is about where the camera is.
+    ///
+    /// What is not a positive number counts as infinitely far.
+    pub fn set_depths(&mut self, depths: &[f64], precision: f64) {
+        let first = &mut self.hypotheses[0];
+        let inverse = depths.iter().map(|z| if *z > 0.0 { 1.0 / z } else { 0.0 });
+        first.reference.set_flat(precision);
+        for (rho, known) in first.reference.inverse_depths.iter_mut().zip(inverse) {
+            *rho = known;
+        }
+        first.reference.normalise();
+        first.reference.set_information(precision.powi(-2));
+        (first.score, self.count, self.missed) = (0.0, 1, self.options.patience);
+    }
+
+    /// The goal's depths as they are known now, with a harmonic mean of 1; infinite where a feature is infinitely far.
+    pub fn depths(&self) -> impl Iterator<Item = f64> {
+        let known = self.hypotheses[..self.count].first();
+        known.into_iter().flat_map(|h| h.reference.inverse_depths.iter().map(|rho| 1.0 / rho.max(0.0)))
+    }
+
+    fn known(&self) -> Known<'_> {
+        Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane }
+    }
+
+    /// Whether noise explains this cost of so many features, whose depths are known or not.
+    fn passes(&self, cost: f64, features: usize) -> bool {
+        let freedom = (2.0 * features as f64 - 6.0).max(1.0);
+        cost <= freedom + self.options.gate * (2.0 * freedom).sqrt() + self.options.gate
+    }
+
+    /// Whether the camera can have come from the last pose to this one.
+    fn is_reachable(&self, from: &RelativePose, to: &Fitted) -> bool {
+        let images = (self.missed + 1) as f64;
+        let deviation = |first: usize| {
+            self.options.gate * (0..3).map(|k| to.covariance[(first + k, first + k)]).sum::<f64>().sqrt()
+        };
+        let turn = from.rotation_error(&to.pose);
+        let way = (from.t_21 - to.pose.t_21).norm();
+        turn <= images * self.options.largest_turn + deviation(0)
+            && way <= images * self.options.largest_move + deviation(3)
+    }
+}
+
+impl<S: PoseSource> PoseEstimator for DepthFilter<S> {
+    fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason> {
+        self.frame.iter_mut().for_each(|f| *f = None);
+        for (kept, seen) in self.frame.iter_mut().zip(features) {
+            *kept = seen.filter(|m| m.iter().all(|c| c.is_finite() && c.abs() < 1e3));
+        }
+        let result = self.estimate_checked();
+        self.missed = if result.is_ok() { 0 } else { self.missed.saturating_add(1) };
+        result
+    }
+}
+
+impl<S: PoseSource> DepthFilter<S> {
+    fn estimate_checked(&mut self) -> Result<Estimate, HoldReason> {
+        if self.seen() < self.options.min_features {
+            return Err(HoldReason::TooFewFeatures);
+        }
+        if self.count == 0 {
+            self.start()?;
+        } else if self.missed > 0 && self.missed % (self.options.patience + 1) == self.options.patience {
+            self.search()?;
+        }
+        let (fitted, reachable) = self.follow()?;
+        if !reachable && self.missed < 2 * self.options.patience {
+            return Err(HoldReason::Jump);
+        }
+        Ok(self.accept(&fitted))
+    }
+
+    fn seen(&self) -> usize {
+        self.frame.iter().flatten().count()
+    }
+
+    /// Fits the image by every hypothesis and puts the best first.
+    fn follow(&mut self) -> Result<(Fitted, bool), HoldReason> {
+        for k in 0..self.count {
+            let cost = self.fit(k).map_or(f64::INFINITY, |fitted| fitted.cost);
+            self.hypotheses[k].score += cost.min(MOST_OF_ONE_IMAGE);
+        }
+        self.hypotheses[..self.count].sort_by(|a, b| a.score.total_cmp(&b.score));
+        let last = self.hypotheses[0].score + HOPELESS;
+        self.count = self.hypotheses[..self.count].iter().take_while(|h| h.score <= last).count();
+        let fitted = self.fit(0).filter(|fitted| self.passes(fitted.cost, self.seen()));
+        let fitted = fitted.or_else(|| self.leave_out()).ok_or(HoldReason::Inconsistent)?;
+        let reachable = self.is_reachable(&self.hypotheses[0].pose, &fitted);
+        Ok((fitted, reachable))
+    }
+
+    /// Fits the image by one hypothesis, from its last pose.
+    fn fit(&mut self, hypothesis: usize) -> Option<Fitted> {
+        let Hypothesis { reference, pose, .. } = &self.hypotheses[hypothesis];
+        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
+        self.workspace.fit(&known, &self.frame, reference, *pose)
+    }
+
+    /// Leaves out the feature that disturbs most, until the rest passes or too little is left.
+    fn leave_out(&mut self) -> Option<Fitted> {
+        while self.seen() > self.options.min_features.saturating_sub(1).max(4) {
+            let mut best: Option<(f64, usize)> = None;
+            for i in 0..self.frame.len() {
+                let Some(image) = self.frame[i].take() else { continue };
+                if let Some(fitted) = self.fit(0)
+                    && best.is_none_or(|(cost, _)| fitted.cost < cost)
+                {
+                    best = Some((fitted.cost, i));
+                }
+                self.frame[i] = Some(image);
+            }
+            let (cost, worst) = best?;
+            self.frame[worst] = None;
+            if self.passes(cost, self.seen()) {
+                return self.fit(0);
+            }
+        }
+        None
+    }
+
+    /// Takes over the pose, and lets the image add to the depths of every hypothesis that it fits.
+    fn accept(&mut self, fitted: &Fitted) -> Estimate {
+        let (inliers, weight) = (self.seen(), self.options.frame_weight);
+        let squares: f64 = self.workspace.squares.iter().filter(|s| s.is_finite()).sum();
+        let estimate = Estimate {
+            pose: fitted.pose,
+            covariance: fitted.covariance,
+            inliers,
+            residual: self.sigma * (squares / (2 * inliers) as f64).sqrt(),
+            alternatives: self.count,
+        };
+        for k in 0..self.count {
+            let Some(fitted) = self.fit(k) else { continue };
+            self.hypotheses[k].pose = fitted.pose;
+            if self.passes(fitted.cost, inliers) {
+                self.workspace.update(&mut self.hypotheses[k].reference, weight);
+            }
+        }
+        estimate
+    }
+
+    /// The candidates of this image.
+    fn solve(&mut self) -> Result<(), HoldReason> {
+        self.matches.clear();
+        for (goal, image) in self.goal.iter().zip(&self.frame) {
+            let Some(image) = image else { continue };
+            if let Ok(m) = Correspondence::from_image_points(*goal, *image) {
+                self.matches.push(m);
+            }
+        }
+        if self.matches.len() < self.source.min_matches() {
+            return Err(HoldReason::TooFewFeatures);
+        }
+        self.source.candidates(&self.matches, &mut self.candidates);
+        if self.candidates.is_empty() { Err(HoldReason::Degenerate) } else { Ok(()) }
+    }
+
+    /// Makes hypotheses of the candidates.
+    fn start(&mut self) -> Result<(), HoldReason> {
+        self.solve()?;
+        for k in 0..self.candidates.len() {
+            let candidate = self.candidates[k];
+            let pose = self.propose(&candidate.pose, candidate.kind == CandidateKind::RotationOnly);
+            if let Some(pose) = pose {
+                self.adopt(pose);
+            }
+        }
+        if self.count == 0 { Err(HoldReason::Inconsistent) } else { Ok(()) }
+    }
+
+    /// Sets the spare hypothesis to the depths of a candidate and returns its pose in the unit of these depths, where it is
+    /// not absurd.
+    fn propose(&mut self, candidate: &RelativePose, is_rotation: bool) -> Option<RelativePose> {
+        let reference = &mut self.spare.reference;
+        reference.set_flat(SPREAD);
+        if is_rotation {
+            return Some(RelativePose::new(candidate.q_21, nalgebra::Vector3::zeros()));
+        }
+        let mut matches = self.matches.iter();
+        let mut behind = 0;
+        for (rho, image) in reference.inverse_depths.iter_mut().zip(&self.frame) {
+            *rho = f64::NAN;
+            if image.is_some() {
+                let depth = matches.next().and_then(|m| candidate.depths(m));
+                *rho = depth.map_or(0.0, |(z1, _)| 1.0 / z1);
+                behind += usize::from(depth.is_some_and(|(z1, z2)| z1 <= 0.0 || z2 <= 0.0));
+            }
+        }
+        // A feature that is not seen is as far as the others.
+        let seen = reference.inverse_depths.iter().filter(|rho| rho.is_finite());
+        let mean = seen.sum::<f64>() / self.matches.len() as f64;
+        if behind * 4 > self.matches.len() || mean <= 0.0 || !mean.is_finite() {
+            return None;
+        }
+        for rho in &mut reference.inverse_depths {
+            *rho = if rho.is_finite() { *rho / mean } else { 1.0 };
+        }
+        let scale = reference.normalise();
+        reference.set_information(SPREAD.powi(-2));
+        Some(RelativePose::new(candidate.q_21, candidate.t_21 * mean * scale))
+    }
+
+    /// Adds the spare hypothesis, fitted from this pose, unless it explains nothing or is there already.
+    fn adopt(&mut self, pose: RelativePose) {
+        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
+        let Some(fitted) = self.workspace.fit(&known, &self.frame, &self.spare.reference, pose) else { return };
+        let same = |h: &Hypothesis| {
+            h.pose.rotation_error(&fitted.pose) < 1e-3 && (h.pose.t_21 - fitted.pose.t_21).norm() < 1e-3
+        };
+        let known = self.hypotheses[..self.count].iter().any(same);
+        if known || !self.passes(fitted.cost, self.seen()) || self.count == MAX_HYPOTHESES {
+            return;
+        }
+        self.workspace.update(&mut self.spare.reference, 1.0);
+        let spread = self.spare.reference.inverse_depths.iter().map(|rho| ((rho - 1.0) / SPREAD).powi(2));
+        self.spare.score = fitted.cost + spread.sum::<f64>();
+        self.spare.pose = fitted.pose;
+        std::mem::swap(&mut self.spare, &mut self.hypotheses[self.count]);
+        self.count += 1;
+    }
+
+    /// Lost: the candidates of this image with the depths of the best hypothesis, and on their own.
+    fn search(&mut self) -> Result<(), HoldReason> {
+        self.solve()?;
+        let mut best: Option<Fitted> = None;
+        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
+        for candidate in self.candidates.iter() {
+            let reference = &self.hypotheses[0].reference;
+            let fitted = self.workspace.fit(&known, &self.frame, reference, candidate.pose);
+            if let Some(fitted) = fitted
+                && best.is_none_or(|b| fitted.cost < b.cost)
+            {
+                best = Some(fitted);
+            }
+        }
+        self.count = 1;
+        if let Some(fitted) = best {
+            self.hypotheses[0].pose = fitted.pose;
+            if self.passes(fitted.cost, self.seen()) {
+                return Ok(());
+            }
+        }
+        self.start()?;
+        for h in &mut self.hypotheses[..self.count] {
+            h.score = h.score.min(MOST_OF_ONE_IMAGE);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,30 @@
+//! Section 10 and appendix C.
+mod closed_loop;
+mod controller;
+mod depth_filter;
+mod differential_drive;
+mod estimate;
+mod fit;
+mod free_camera;
+mod imaging;
+mod law;
+mod per_frame;
+mod plant;
+mod reference;
+pub mod scenario;
+mod source;
+mod twist;
+
+pub use closed_loop::{Record, World};
+pub use controller::{Border, Safety, Servo, Step};
+pub use depth_filter::{DepthFilter, FilterOptions};
+pub use differential_drive::{DifferentialDriveLaw, PlanarPose};
+pub use estimate::{Estimate, HoldReason, PoseEstimator};
+pub use fit::Plane;
+pub use free_camera::FreeCameraLaw;
+pub use imaging::Disturbances;
+pub use law::ControlLaw;
+pub use per_frame::{Choice, Length, PerFrame};
+pub use plant::{DifferentialDrive, FreeCamera, Plant};
+pub use source::PoseSource;
+pub use twist::{Limits, Twist};
