@@ -9,8 +9,8 @@ use quest_benches::{SEED, parallel};
 use quest_core::RelativePose;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
-    Border, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw, Limits,
-    Plane, Plant, Safety, Servo, World,
+    ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw, Limits, Plane,
+    Plant, Safety, Servo, World,
 };
 use quest_core::solver::SolverName;
 use rand_chacha::ChaCha8Rng;
@@ -83,7 +83,11 @@ fn cells() -> Vec<Cell> {
         Cell { features: Features::Coplanar, ..robot("robot, 5 coplanar features, 0.5 px", 5, 0.5) },
         Cell { features: Features::Coplanar, ..robot("robot, 20 coplanar features, 0.5 px", 20, 0.5) },
         Cell { plane: false, ..robot("robot free, 20 features, 0.5 px", 20, 0.5) },
-        Cell { plane: false, goal_images: 30, ..robot("robot free, 5 features, 30 goal images, 0.5 px", 5, 0.5) },
+        Cell {
+            plane: false,
+            goal_images: 30,
+            ..robot("robot free, 5 features, 30 goal images, 0.5 px", 5, 0.5)
+        },
         Cell { plane: false, ..robot("robot free, 5 features, 0.5 px", 5, 0.5) },
         arm("arm, 5 features, noise-free", 5, 0.0),
         arm("arm, 20 features, noise-free", 20, 0.0),
@@ -102,7 +106,8 @@ fn cells() -> Vec<Cell> {
         let mut cell = Cell::new(&format!("{body:?}, 20 features, 2 % wrong images, 0.5 px"), body, 20, 0.5);
         cell.disturbances.wrong_images = 0.02;
         cells.push(cell);
-        let mut cell = Cell::new(&format!("{body:?}, 20 features, down to four and back, 0.5 px"), body, 20, 0.5);
+        let mut cell =
+            Cell::new(&format!("{body:?}, 20 features, down to four and back, 0.5 px"), body, 20, 0.5);
         cell.disturbances.lost = Some((20..60, 4));
         cells.push(cell);
         let mut cell = Cell::new(&format!("{body:?}, 20 features, 3 images late, 0.5 px"), body, 20, 0.5);
@@ -179,17 +184,17 @@ impl Cell {
         }
     }
 
-    fn drive<P: Plant, L: ControlLaw>(&self, world: World, mut plant: P, law: L, rng: &mut ChaCha8Rng) -> Outcome {
+    fn drive<P: Plant, L: ControlLaw>(
+        &self,
+        world: World,
+        mut plant: P,
+        law: L,
+        rng: &mut ChaCha8Rng,
+    ) -> Outcome {
         let goal = world.on_plane(&world.goal_pixels(rng));
-        let focal = world.camera.focal_lengths().0;
-        let rounding = if self.disturbances.rounded { 1.0 / 12.0 } else { 0.0 };
-        let noise = self.disturbances.noise_px.powi(2) + rounding;
-        let noise = noise.sqrt().max(0.05) / focal;
         let options = FilterOptions {
-            noise,
-            goal_noise: noise / (self.goal_images as f64).sqrt(),
             plane: self.plane.then_some(Plane { tilt: 0.002, height: 0.001 }),
-            ..FilterOptions::default()
+            ..world.filter_options(&LIMITS, 2.0)
         };
         let mut filter = DepthFilter::new(&goal, SolverName::Quest, options);
         if self.known_depths {
@@ -198,7 +203,7 @@ impl Cell {
         }
         let mut safety = Safety::new(LIMITS);
         if self.body == Body::Robot {
-            safety.border = border(&world, 15.0);
+            safety.border = world.border(15.0);
         }
         let mut servo = Servo::new(&goal, filter, law, safety);
         let (mut holds, mut unsafe_commands, mut last) = (0, 0, None);
@@ -229,16 +234,6 @@ impl Cell {
     }
 }
 
-/// The image but for so many pixels on each side, on the plane z = 1.
-fn border(world: &World, margin: f64) -> Option<Border> {
-    let (width, height) = world.camera.size()?;
-    let corner = |x, y| world.on_plane(&[[x, y]])[0];
-    Some(Border {
-        least: corner(margin, margin),
-        most: corner(f64::from(width) - 1.0 - margin, f64::from(height) - 1.0 - margin),
-    })
-}
-
 fn main() {
     let arguments = Arguments::parse();
     println!("{} starts a cell, seed {}\n", arguments.starts, arguments.seed);
@@ -246,7 +241,7 @@ fn main() {
         "| cell | converged % | left image | held | inaccurate | astray | median cm | 98 % cm | median ° | 98 % ° | holds a run | unsafe |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
-    for cell in cells().iter().filter(|cell| cell.name.contains(&arguments.cell)) {
+    for cell in cells().iter().filter(|c| c.name.contains(&arguments.cell)) {
         let run = |index| Ok::<_, Infallible>(cell.run(arguments.seed, index));
         let Ok(outcomes) = parallel::map(arguments.starts, arguments.threads, run);
         let count = |end| outcomes.iter().filter(|o| o.end == end).count();

@@ -5,6 +5,7 @@
 mod candidate_table;
 mod options;
 mod rows;
+mod servo;
 mod solve;
 mod solvers;
 mod table;
@@ -18,6 +19,7 @@ const EXAMPLES: &str = "\
 Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
   quest-cli solve --format json pair.json | jq     the same for programs
+  quest-cli servo --scenario robot --noise 0.5     a robot that drives to where an image was taken
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -34,6 +36,7 @@ struct Arguments {
 enum Command {
     Solve(Box<solve::Arguments>),
     Solvers(solvers::Arguments),
+    Servo(Box<servo::Arguments>),
 }
 
 /// What the exit status says of a run that went well.
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
+        Command::Servo(arguments) => servo::run(&arguments),
     };
     match result {
         Ok(Outcome::Answer) => ExitCode::SUCCESS,

@@ -6,6 +6,7 @@ mod candidates;
 mod formats;
 mod output;
 mod readme;
+mod servo;
 
 use std::{
     fs,

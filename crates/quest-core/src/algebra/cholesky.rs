@@ -58,9 +58,8 @@ mod tests {
             let entry = |i: usize, j: usize| 1.0 / (1.0 + (3 * i + 5 * j) as f64).sin();
             // B Bᵀ + I is positive definite.
             let square = |i: usize, j: usize| (0..n).map(|k| entry(i, k) * entry(j, k)).sum::<f64>();
-            let a: Vec<f64> = (0..n * n)
-                .map(|k| square(k / n, k % n) + if k / n == k % n { 1.0 } else { 0.0 })
-                .collect();
+            let a: Vec<f64> =
+                (0..n * n).map(|k| square(k / n, k % n) + if k / n == k % n { 1.0 } else { 0.0 }).collect();
             let x: Vec<f64> = (0..n).map(|i| i as f64 - 1.5).collect();
             let mut b: Vec<[f64; 1]> =
                 (0..n).map(|i| [(0..n).map(|j| a[i * n + j] * x[j]).sum::<f64>()]).collect();

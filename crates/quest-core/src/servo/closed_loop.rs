@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use super::controller::{Servo, Step};
+use super::controller::{Border, Servo, Step};
 use super::estimate::PoseEstimator;
 use super::imaging::{Disturbances, Imaging};
-use super::{ControlLaw, Plant};
+use super::{ControlLaw, FilterOptions, Limits, Plant};
 use crate::{Camera, RelativePose};
 
 /// What a robot sees and how often.
@@ -56,6 +56,33 @@ impl World {
     #[must_use]
     pub fn on_plane(&self, pixels: &[[f64; 2]]) -> Vec<[f64; 2]> {
         pixels.iter().map(|&p| self.imaging().on_plane(p).unwrap_or([f64::NAN; 2])).collect()
+    }
+
+    /// The estimator's options that fit these images: the noise with its rounding, on the plane z = 1, and motions of up to the
+    /// limits at this frame rate, with the features at about `unit` metres.
+    #[must_use]
+    pub fn filter_options(&self, limits: &Limits, unit: f64) -> FilterOptions {
+        // Exact pixels are given a twentieth of a pixel: a standard deviation of zero has no inverse.
+        const LEAST_PX: f64 = 0.05;
+        let Disturbances { noise_px, rounded, .. } = self.disturbances;
+        let variance = noise_px * noise_px + if rounded { 1.0 / 12.0 } else { 0.0 };
+        let noise = variance.sqrt().max(LEAST_PX) / self.camera.focal_lengths().0;
+        FilterOptions {
+            noise,
+            goal_noise: noise / (self.goal_images.max(1) as f64).sqrt(),
+            largest_turn: 1.5 * limits.turn_rate * self.period,
+            largest_move: 1.5 * limits.speed * self.period / unit,
+            ..FilterOptions::default()
+        }
+    }
+
+    /// The image but for so many pixels on each side; `None` for a camera without a size.
+    #[must_use]
+    pub fn border(&self, margin: f64) -> Option<Border> {
+        let (width, height) = self.camera.size()?;
+        let imaging = self.imaging();
+        let most = [width, height].map(|size| f64::from(size) - 1.0 - margin);
+        Some(Border { least: imaging.on_plane([margin; 2])?, most: imaging.on_plane(most)? })
     }
 
     /// Whether all features are at least so many pixels inside of the image.

@@ -65,7 +65,9 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
     /// The command for one image: one entry for each feature of the goal, in the same order, on the plane z = 1 of the
     /// current camera; `None` where it is not seen. Takes nothing from the heap.
     pub fn step(&mut self, features: &[Option<[f64; 2]>]) -> Step {
-        let estimate = self.estimator.estimate(features).and_then(|estimate| self.trusted(estimate));
+        let estimate = self.estimator.estimate(features);
+        let estimate =
+            estimate.and_then(|e| if self.is_certain(&e) { Ok(e) } else { Err(HoldReason::Uncertain) });
         let wanted = estimate.as_ref().map_or(Twist::zero(), |estimate| self.law.command(&estimate.pose));
         let command = self.guarded(wanted, features);
         Step { command, estimate }
@@ -81,17 +83,13 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         &self.law
     }
 
-    fn trusted(&self, estimate: Estimate) -> Result<Estimate, HoldReason> {
+    fn is_certain(&self, estimate: &Estimate) -> bool {
         let deviation =
             |first: usize| (0..3).map(|k| estimate.covariance[(first + k, first + k)]).sum::<f64>().sqrt();
         // An estimator without a covariance says infinite: there is nothing to hold against it.
-        let exceeds = |deviation: f64, most: f64| deviation.is_finite() && deviation > most;
-        if exceeds(deviation(0), self.safety.rotation_uncertainty)
-            || exceeds(deviation(3), self.safety.translation_uncertainty)
-        {
-            return Err(HoldReason::Uncertain);
-        }
-        Ok(estimate)
+        let within = |deviation: f64, most: f64| !deviation.is_finite() || deviation <= most;
+        within(deviation(0), self.safety.rotation_uncertainty)
+            && within(deviation(3), self.safety.translation_uncertainty)
     }
 
     fn guarded(&self, twist: Twist, features: &[Option<[f64; 2]>]) -> Twist {

@@ -13,7 +13,9 @@ use super::estimate::{Estimate, HoldReason, PoseEstimator};
 use super::fit::{Fitted, Known, Plane, Workspace};
 use super::reference::DepthReference;
 use super::source::PoseSource;
-use crate::{CandidateKind, Candidates, Correspondence, RelativePose};
+use nalgebra::Vector3;
+
+use crate::{Candidate, CandidateKind, Candidates, Correspondence, RelativePose};
 
 /// How many answers to the first image are kept apart.
 const MAX_HYPOTHESES: usize = 8;
@@ -21,8 +23,10 @@ const MAX_HYPOTHESES: usize = 8;
 const HOPELESS: f64 = 30.0;
 /// No single image counts for more than this: the odds of 1 to 300,000 that a false one may cost the truth.
 const MOST_OF_ONE_IMAGE: f64 = 25.0;
-/// How much inverse depths differ from their mean, before anything is known of them.
-const SPREAD: f64 = 0.5;
+
+/// Two images that show the same features were taken in about the same direction: one standard deviation, in radians. It orders
+/// the answers to the first image where nothing else tells them apart.
+const LIKELY_TURN: f64 = 1.0;
 
 /// What is known of the images and the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +37,9 @@ pub struct FilterOptions {
     pub goal_noise: f64,
     /// Fewer features than this are not acted on.
     pub min_features: usize,
+    /// How much the inverse depths of the features at the goal differ from their mean, before anything is known of them:
+    /// one standard deviation, as a share of the mean.
+    pub spread: f64,
     /// The weight of one image in the goal's depths.
     pub frame_weight: f64,
     /// How many standard deviations an image, a feature or a motion may be off.
@@ -54,6 +61,7 @@ impl Default for FilterOptions {
             noise: 1e-3,
             goal_noise: 1e-3,
             min_features: 5,
+            spread: 0.3,
             frame_weight: 0.05,
             gate: 5.0,
             largest_turn: 0.1,
@@ -86,6 +94,7 @@ pub struct DepthFilter<S> {
     spare: Hypothesis,
     workspace: Workspace,
     frame: Vec<Option<[f64; 2]>>,
+    proposed: Vec<f64>,
     matches: Vec<Correspondence>,
     candidates: Candidates,
     /// Images since the last accepted pose.
@@ -98,7 +107,7 @@ impl<S: PoseSource> DepthFilter<S> {
     pub fn new(goal: &[[f64; 2]], source: S, options: FilterOptions) -> Self {
         let n = goal.len();
         let empty = Hypothesis {
-            reference: DepthReference::flat(n, SPREAD),
+            reference: DepthReference::flat(n, options.spread),
             pose: RelativePose::identity(),
             score: 0.0,
         };
@@ -112,6 +121,7 @@ impl<S: PoseSource> DepthFilter<S> {
             spare: empty,
             workspace: Workspace::new(n),
             frame: vec![None; n],
+            proposed: vec![1.0; n],
             matches: Vec::with_capacity(n),
             candidates: Candidates::new(),
             missed: 0,
@@ -138,10 +148,6 @@ impl<S: PoseSource> DepthFilter<S> {
     pub fn depths(&self) -> impl Iterator<Item = f64> {
         let known = self.hypotheses[..self.count].first();
         known.into_iter().flat_map(|h| h.reference.inverse_depths.iter().map(|rho| 1.0 / rho.max(0.0)))
-    }
-
-    fn known(&self) -> Known<'_> {
-        Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane }
     }
 
     /// Whether noise explains this cost of so many features, whose depths are known or not.
@@ -198,13 +204,15 @@ impl<S: PoseSource> DepthFilter<S> {
 
     /// Fits the image by every hypothesis and puts the best first.
     fn follow(&mut self) -> Result<(Fitted, bool), HoldReason> {
-        for k in 0..self.count {
-            let cost = self.fit(k).map_or(f64::INFINITY, |fitted| fitted.cost);
-            self.hypotheses[k].score += cost.min(MOST_OF_ONE_IMAGE);
+        if self.count > 1 {
+            for k in 0..self.count {
+                let cost = self.fit(k).map_or(f64::INFINITY, |fitted| fitted.cost);
+                self.hypotheses[k].score += cost.min(MOST_OF_ONE_IMAGE);
+            }
+            self.hypotheses[..self.count].sort_by(|a, b| a.score.total_cmp(&b.score));
+            let last = self.hypotheses[0].score + HOPELESS;
+            self.count = self.hypotheses[..self.count].iter().take_while(|h| h.score <= last).count();
         }
-        self.hypotheses[..self.count].sort_by(|a, b| a.score.total_cmp(&b.score));
-        let last = self.hypotheses[0].score + HOPELESS;
-        self.count = self.hypotheses[..self.count].iter().take_while(|h| h.score <= last).count();
         let fitted = self.fit(0).filter(|fitted| self.passes(fitted.cost, self.seen()));
         let fitted = fitted.or_else(|| self.leave_out()).ok_or(HoldReason::Inconsistent)?;
         let reachable = self.is_reachable(&self.hypotheses[0].pose, &fitted);
@@ -251,7 +259,10 @@ impl<S: PoseSource> DepthFilter<S> {
             residual: self.sigma * (squares / (2 * inliers) as f64).sqrt(),
             alternatives: self.count,
         };
-        for k in 0..self.count {
+        // The workspace still holds the fit of the best hypothesis.
+        self.hypotheses[0].pose = fitted.pose;
+        self.workspace.update(&mut self.hypotheses[0].reference, weight);
+        for k in 1..self.count {
             let Some(fitted) = self.fit(k) else { continue };
             self.hypotheses[k].pose = fitted.pose;
             if self.passes(fitted.cost, inliers) {
@@ -281,62 +292,60 @@ impl<S: PoseSource> DepthFilter<S> {
     fn start(&mut self) -> Result<(), HoldReason> {
         self.solve()?;
         for k in 0..self.candidates.len() {
-            let candidate = self.candidates[k];
-            let pose = self.propose(&candidate.pose, candidate.kind == CandidateKind::RotationOnly);
-            if let Some(pose) = pose {
+            let Candidate { kind, pose, .. } = self.candidates[k];
+            if let Some(pose) = self.propose(&pose, kind == CandidateKind::RotationOnly) {
                 self.adopt(pose);
             }
         }
         if self.count == 0 { Err(HoldReason::Inconsistent) } else { Ok(()) }
     }
 
-    /// Sets the spare hypothesis to the depths of a candidate and returns its pose in the unit of these depths, where it is
-    /// not absurd.
+    /// The inverse depths of a candidate, left in `proposed`, and its pose in their unit, where it is not absurd.
     fn propose(&mut self, candidate: &RelativePose, is_rotation: bool) -> Option<RelativePose> {
-        let reference = &mut self.spare.reference;
-        reference.set_flat(SPREAD);
         if is_rotation {
-            return Some(RelativePose::new(candidate.q_21, nalgebra::Vector3::zeros()));
+            self.proposed.fill(1.0);
+            return Some(RelativePose::new(candidate.q_21, Vector3::zeros()));
         }
-        let mut matches = self.matches.iter();
-        let mut behind = 0;
-        for (rho, image) in reference.inverse_depths.iter_mut().zip(&self.frame) {
-            *rho = f64::NAN;
-            if image.is_some() {
-                let depth = matches.next().and_then(|m| candidate.depths(m));
-                *rho = depth.map_or(0.0, |(z1, _)| 1.0 / z1);
-                behind += usize::from(depth.is_some_and(|(z1, z2)| z1 <= 0.0 || z2 <= 0.0));
-            }
+        let (mut sum, mut behind) = (0.0, 0);
+        for m in &self.matches {
+            let depths = candidate.depths(m);
+            sum += depths.map_or(0.0, |(z1, _)| 1.0 / z1);
+            behind += usize::from(depths.is_some_and(|(z1, z2)| z1 <= 0.0 || z2 <= 0.0));
         }
-        // A feature that is not seen is as far as the others.
-        let seen = reference.inverse_depths.iter().filter(|rho| rho.is_finite());
-        let mean = seen.sum::<f64>() / self.matches.len() as f64;
+        let mean = sum / self.matches.len() as f64;
         if behind * 4 > self.matches.len() || mean <= 0.0 || !mean.is_finite() {
             return None;
         }
-        for rho in &mut reference.inverse_depths {
-            *rho = if rho.is_finite() { *rho / mean } else { 1.0 };
+        let mut matches = self.matches.iter();
+        for (rho, image) in self.proposed.iter_mut().zip(&self.frame) {
+            // A feature that is not seen is as far as the others.
+            let depths = image.and_then(|_| matches.next()).map(|m| candidate.depths(m));
+            *rho = depths.map_or(1.0, |depths| depths.map_or(0.0, |(z1, _)| 1.0 / (z1 * mean)));
         }
-        let scale = reference.normalise();
-        reference.set_information(SPREAD.powi(-2));
-        Some(RelativePose::new(candidate.q_21, candidate.t_21 * mean * scale))
+        Some(RelativePose::new(candidate.q_21, candidate.t_21 * mean))
     }
 
-    /// Adds the spare hypothesis, fitted from this pose, unless it explains nothing or is there already.
+    /// Adds the hypothesis that is found from this pose and the proposed inverse depths, unless it explains nothing or is
+    /// there already.
     fn adopt(&mut self, pose: RelativePose) {
+        self.spare.reference.set_flat(self.options.spread);
         let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        let Some(fitted) = self.workspace.fit(&known, &self.frame, &self.spare.reference, pose) else { return };
+        let (frame, reference) = (&self.frame, &self.spare.reference);
+        let Some(fitted) = self.workspace.fit_from(&known, frame, reference, pose, &self.proposed) else {
+            return;
+        };
         let same = |h: &Hypothesis| {
             h.pose.rotation_error(&fitted.pose) < 1e-3 && (h.pose.t_21 - fitted.pose.t_21).norm() < 1e-3
         };
-        let known = self.hypotheses[..self.count].iter().any(same);
-        if known || !self.passes(fitted.cost, self.seen()) || self.count == MAX_HYPOTHESES {
+        let is_known = self.hypotheses[..self.count].iter().any(same);
+        // The depths are not known yet: each may be off by its spread.
+        let depths = self.goal.len() as f64;
+        if is_known || !self.passes(fitted.cost - depths, self.seen()) || self.count == MAX_HYPOTHESES {
             return;
         }
         self.workspace.update(&mut self.spare.reference, 1.0);
-        let spread = self.spare.reference.inverse_depths.iter().map(|rho| ((rho - 1.0) / SPREAD).powi(2));
-        self.spare.score = fitted.cost + spread.sum::<f64>();
-        self.spare.pose = fitted.pose;
+        let turn = fitted.pose.q_21.angle() / LIKELY_TURN;
+        (self.spare.score, self.spare.pose) = (fitted.cost + turn * turn, fitted.pose);
         std::mem::swap(&mut self.spare, &mut self.hypotheses[self.count]);
         self.count += 1;
     }

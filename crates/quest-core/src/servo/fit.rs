@@ -94,7 +94,19 @@ impl Workspace {
         reference: &DepthReference,
         start: RelativePose,
     ) -> Option<Fitted> {
-        self.inverse_depths.copy_from_slice(&reference.inverse_depths);
+        self.fit_from(known, frame, reference, start, &reference.inverse_depths)
+    }
+
+    /// The same from other inverse depths.
+    pub(super) fn fit_from(
+        &mut self,
+        known: &Known<'_>,
+        frame: &[Option<[f64; 2]>],
+        reference: &DepthReference,
+        start: RelativePose,
+        inverse_depths: &[f64],
+    ) -> Option<Fitted> {
+        self.inverse_depths.copy_from_slice(inverse_depths);
         let mut pose = start;
         let mut cost = self.linearise(known, frame, reference, &pose)?;
         let mut damping = 0.0;
@@ -116,7 +128,7 @@ impl Workspace {
                     pose = moved;
                     cost = self.linearise(known, frame, reference, &pose)?;
                     damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
-                    if change <= 1e-6 * cost + 1e-9 {
+                    if change <= 1e-4 * cost + 1e-9 {
                         break;
                     }
                 }

@@ -70,7 +70,8 @@ impl Imaging<'_> {
         index: usize,
         rng: &mut ChaCha8Rng,
     ) -> Vec<Option<[f64; 2]>> {
-        let pose = if rng.random::<f64>() < self.disturbances.wrong_images { elsewhere(pose, rng) } else { *pose };
+        let pose =
+            if rng.random::<f64>() < self.disturbances.wrong_images { elsewhere(pose, rng) } else { *pose };
         let mut image: Vec<_> = self.project(&pose).collect();
         for pixel in image.iter_mut().flatten() {
             *pixel = self.disturb(*pixel, rng);

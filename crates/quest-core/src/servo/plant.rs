@@ -92,10 +92,8 @@ mod tests {
     #[test]
     fn a_long_step_is_many_short_ones() {
         let twist = Twist { linear: Vector3::new(0.1, -0.2, 0.3), angular: Vector3::new(0.5, 0.7, -0.4) };
-        let start = RelativePose::new(
-            UnitQuaternion::new(Vector3::new(0.1, 0.2, 0.3)),
-            Vector3::new(1.0, 2.0, 3.0),
-        );
+        let start =
+            RelativePose::new(UnitQuaternion::new(Vector3::new(0.1, 0.2, 0.3)), Vector3::new(1.0, 2.0, 3.0));
         let (mut long, mut short) = (FreeCamera::new(start), FreeCamera::new(start));
         long.advance(&twist, 2.0);
         (0..20_000).for_each(|_| short.advance(&twist, 1e-4));

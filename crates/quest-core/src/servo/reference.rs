@@ -37,11 +37,6 @@ impl DepthReference {
         (0..n).for_each(|i| self.information[i * n + i] = information);
     }
 
-    pub(super) fn copy_from(&mut self, other: &Self) {
-        self.inverse_depths.copy_from_slice(&other.inverse_depths);
-        self.information.copy_from_slice(&other.information);
-    }
-
     /// `Λ (ρ − ρ̂)` of one feature.
     pub(super) fn pull(&self, feature: usize, inverse_depths: &[f64]) -> f64 {
         let n = self.len();
@@ -50,11 +45,10 @@ impl DepthReference {
         row.iter().zip(off).map(|(w, off)| w * off).sum()
     }
 
-    /// Scales the inverse depths to a mean of 1; returns the factor by which lengths have to be multiplied to go along.
-    pub(super) fn normalise(&mut self) -> f64 {
+    /// Scales the inverse depths to a mean of 1.
+    pub(super) fn normalise(&mut self) {
         let mean = self.inverse_depths.iter().sum::<f64>() / self.len() as f64;
         self.inverse_depths.iter_mut().for_each(|rho| *rho /= mean);
         self.information.iter_mut().for_each(|w| *w *= mean * mean);
-        mean
     }
 }
