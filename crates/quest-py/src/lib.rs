@@ -5,6 +5,7 @@ mod arrays;
 mod camera;
 mod candidate;
 mod errors;
+mod servo;
 mod solve;
 
 use pyo3::pymodule;
@@ -20,6 +21,8 @@ mod _core {
     use crate::candidate::{_candidate, Candidate};
     #[pymodule_export]
     use crate::errors::{BadCamera, DegenerateInput, NotFinite, QuestError, ShapeMismatch, TooFewMatches};
+    #[pymodule_export]
+    use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
 

@@ -76,13 +76,13 @@ impl World {
         }
     }
 
-    /// The image but for so many pixels on each side; `None` for a camera without a size.
+    /// The image but for so many pixels at the left and the right; `None` for a camera without a size.
     #[must_use]
     pub fn border(&self, margin: f64) -> Option<Border> {
         let (width, height) = self.camera.size()?;
         let imaging = self.imaging();
-        let most = [width, height].map(|size| f64::from(size) - 1.0 - margin);
-        Some(Border { least: imaging.on_plane([margin; 2])?, most: imaging.on_plane(most)? })
+        let at = |u| imaging.on_plane([u, 0.5 * f64::from(height)]);
+        Some(Border { left: at(margin)?[0], right: at(f64::from(width) - 1.0 - margin)?[0] })
     }
 
     /// Whether all features are at least so many pixels inside of the image.

@@ -1,17 +1,15 @@
 //! From an image to a command: estimator, law, guards, limits.
 
-use nalgebra::Vector3;
-
 use super::estimate::{Estimate, HoldReason, PoseEstimator};
 use super::{ControlLaw, Limits, Twist};
 
-/// A rectangle of the image in which the features are to stay, on the plane z = 1.
+/// Where the features are to stay in the image, on the plane z = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Border {
-    /// Left and upper end.
-    pub least: [f64; 2],
-    /// Right and lower end.
-    pub most: [f64; 2],
+    /// The left end.
+    pub left: f64,
+    /// The right end.
+    pub right: f64,
 }
 
 /// What keeps a robot safe.
@@ -19,7 +17,7 @@ pub struct Border {
 pub struct Safety {
     /// Speed and turn rate.
     pub limits: Limits,
-    /// Turns that push a feature out of this rectangle are left out.
+    /// Turning about the vertical gives way to features at the left and right border of the image.
     pub border: Option<Border>,
     /// Where the rotation's standard deviation is larger than this, in radians, there is no command.
     pub rotation_uncertainty: f64,
@@ -95,22 +93,37 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
     fn guarded(&self, twist: Twist, features: &[Option<[f64; 2]>]) -> Twist {
         let mut twist = twist;
         if let Some(border) = &self.safety.border {
-            let seen = features.iter().zip(&self.goal).filter_map(|(m, goal)| m.map(|m| (m, goal)));
-            if seen.into_iter().any(|(m, goal)| is_pushed_out(border, m, goal, &twist.angular)) {
-                twist.angular = Vector3::zeros();
-            }
+            twist.angular.y = border.turn(twist.angular.y, features.iter().zip(&self.goal));
         }
         self.safety.limits.apply(&twist)
     }
 }
 
-/// Whether turning moves a feature further out of the border, away from where it is at the goal.
-fn is_pushed_out(border: &Border, m: [f64; 2], goal: &[f64; 2], w: &Vector3<f64>) -> bool {
-    // The point (u, v, 1) moves by −w × (u, v, 1), its image by what is left on the plane z = 1.
-    let moves = -w.cross(&Vector3::new(m[0], m[1], 1.0));
-    (0..2).any(|k| {
-        let flow = moves[k] - m[k] * moves.z;
-        (m[k] < border.least[k].min(goal[k]) && flow < 0.0)
-            || (m[k] > border.most[k].max(goal[k]) && flow > 0.0)
-    })
+impl Border {
+    /// How fast a feature outside of the border is brought back: in 1/s.
+    const RETURN_RATE: f64 = 3.0;
+
+    /// The turn rate, in rad/s, that is closest to what is wanted and brings features back from outside of the border, each at a rate
+    /// in proportion to its distance. Where it is outside at the goal too the goal's place takes the place of the border.
+    fn turn<'a>(
+        &self,
+        wanted: f64,
+        features: impl Iterator<Item = (&'a Option<[f64; 2]>, &'a [f64; 2])>,
+    ) -> f64 {
+        let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (seen, goal) in features {
+            let Some([u, _]) = *seen else { continue };
+            let (left, right) = (self.left.min(goal[0]), self.right.max(goal[0]));
+            // Turning right by w moves a feature to the left by w (1 + u²).
+            let outside = if u > right { u - right } else { (u - left).min(0.0) };
+            let rate = Self::RETURN_RATE * outside / (1.0 + u * u);
+            if outside > 0.0 {
+                least = least.max(rate);
+            } else if outside < 0.0 {
+                most = most.min(rate);
+            }
+        }
+        // Features on both sides: turning helps none of them.
+        if least > most { 0.0 } else { wanted.clamp(least, most) }
+    }
 }

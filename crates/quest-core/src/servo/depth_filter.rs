@@ -48,6 +48,9 @@ pub struct FilterOptions {
     pub largest_turn: f64,
     /// The largest change of t from one image to the next, in the unit of the goal's depths.
     pub largest_move: f64,
+    /// The first so many images are averaged before the camera is told to move: the depths of the first pair decide the
+    /// way, and the noise of these images can still be averaged away.
+    pub first_images: usize,
     /// After so many images without a pose the candidates are asked again.
     pub patience: usize,
     /// For a robot that moves on a plane with a level camera: how exactly.
@@ -66,6 +69,7 @@ impl Default for FilterOptions {
             gate: 5.0,
             largest_turn: 0.1,
             largest_move: 0.1,
+            first_images: 10,
             patience: 5,
             plane: None,
         }
@@ -95,6 +99,9 @@ pub struct DepthFilter<S> {
     workspace: Workspace,
     frame: Vec<Option<[f64; 2]>>,
     proposed: Vec<f64>,
+    /// Of each feature, its places in the first images.
+    first: Vec<Vec<[f64; 2]>>,
+    first_seen: usize,
     matches: Vec<Correspondence>,
     candidates: Candidates,
     /// Images since the last accepted pose.
@@ -122,6 +129,8 @@ impl<S: PoseSource> DepthFilter<S> {
             workspace: Workspace::new(n),
             frame: vec![None; n],
             proposed: vec![1.0; n],
+            first: (0..n).map(|_| Vec::with_capacity(options.first_images)).collect(),
+            first_seen: 0,
             matches: Vec::with_capacity(n),
             candidates: Candidates::new(),
             missed: 0,
@@ -187,15 +196,42 @@ impl<S: PoseSource> DepthFilter<S> {
             return Err(HoldReason::TooFewFeatures);
         }
         if self.count == 0 {
+            self.average_first()?;
+            self.sigma = self.sigma_of_mean(self.options.first_images);
             self.start()?;
         } else if self.missed > 0 && self.missed % (self.options.patience + 1) == self.options.patience {
             self.search()?;
         }
-        let (fitted, reachable) = self.follow()?;
+        let result = self.follow();
+        self.sigma = self.sigma_of_mean(1);
+        let (fitted, reachable) = result?;
         if !reachable && self.missed < 2 * self.options.patience {
             return Err(HoldReason::Jump);
         }
         Ok(self.accept(&fitted))
+    }
+
+    /// The noise of a difference between the goal and the mean of so many images.
+    fn sigma_of_mean(&self, images: usize) -> f64 {
+        (self.options.noise / (images.max(1) as f64).sqrt()).hypot(self.options.goal_noise)
+    }
+
+    /// Collects the first images, and replaces the last of them by their mean.
+    fn average_first(&mut self) -> Result<(), HoldReason> {
+        for (places, seen) in self.first.iter_mut().zip(&self.frame) {
+            places.extend(seen.filter(|_| places.len() < places.capacity()));
+        }
+        self.first_seen += 1;
+        if self.first_seen < self.options.first_images {
+            return Err(HoldReason::Starting);
+        }
+        let reach = self.options.gate * self.options.noise;
+        for (seen, places) in self.frame.iter_mut().zip(&mut self.first) {
+            *seen = mean_around_median(places, reach).filter(|_| 2 * places.len() > self.first_seen);
+            places.clear();
+        }
+        self.first_seen = 0;
+        if self.seen() < self.options.min_features { Err(HoldReason::TooFewFeatures) } else { Ok(()) }
     }
 
     fn seen(&self) -> usize {
@@ -377,4 +413,19 @@ impl<S: PoseSource> DepthFilter<S> {
         }
         Ok(())
     }
+}
+
+/// The mean of the places that are not further than `reach` from their median, in each coordinate: a false match in some of the
+/// images does not disturb it.
+fn mean_around_median(places: &mut [[f64; 2]], reach: f64) -> Option<[f64; 2]> {
+    let middle = places.len() / 2;
+    let mut mean = [0.0; 2];
+    for (k, mean) in mean.iter_mut().enumerate() {
+        places.sort_unstable_by(|a, b| a[k].total_cmp(&b[k]));
+        let median = places.get(middle)?[k];
+        let near = places.iter().map(|p| p[k]).filter(|c| (c - median).abs() <= reach);
+        let (sum, count) = near.fold((0.0, 0.0), |(sum, count), c| (sum + c, count + 1.0));
+        *mean = sum / count;
+    }
+    Some(mean)
 }

@@ -108,7 +108,7 @@ impl DifferentialDriveLaw {
             speed_gain,
             turn_gain,
             stop_distance: 0.0015,
-            sideways_distance: 0.06,
+            sideways_distance: 0.03,
             start_distance: 0.12,
             fade_distance: 0.02,
             phase: Phase::Start,

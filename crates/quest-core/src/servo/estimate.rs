@@ -24,6 +24,9 @@ pub struct Estimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HoldReason {
+    /// The first images are being averaged.
+    #[error("the first images are being averaged")]
+    Starting,
     /// Too few features of the goal are seen.
     #[error("too few features of the goal are seen")]
     TooFewFeatures,
@@ -46,6 +49,7 @@ impl HoldReason {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Starting => "starting",
             Self::TooFewFeatures => "too_few_features",
             Self::Degenerate => "degenerate",
             Self::Inconsistent => "inconsistent",
