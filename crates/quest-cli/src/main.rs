@@ -9,6 +9,7 @@ mod input;
 mod options;
 mod progress;
 mod rows;
+mod servo;
 mod simulate;
 mod solve;
 mod solvers;
@@ -26,6 +27,7 @@ Examples:
   quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli solve --format json pair.json | jq     the same for programs
   quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
+  quest-cli servo --scenario robot --noise 0.5     a robot that drives to where an image was taken
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -43,6 +45,7 @@ enum Command {
     Solve(Box<solve::Arguments>),
     Estimate(Box<estimate::Arguments>),
     Simulate(Box<simulate::Arguments>),
+    Servo(Box<servo::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
         Command::Solve(arguments) => solve::run(&arguments),
         Command::Estimate(arguments) => estimate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Servo(arguments) => servo::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

@@ -7,6 +7,7 @@ mod candidate;
 mod errors;
 mod estimate;
 mod estimate_batch;
+mod servo;
 mod solve;
 
 use pyo3::pymodule;
@@ -28,6 +29,8 @@ mod _core {
     use crate::estimate::{_estimate, _runner_up, Estimate, RunnerUp, estimate};
     #[pymodule_export]
     use crate::estimate_batch::{_estimate_batch, EstimateBatch, estimate_batch};
+    #[pymodule_export]
+    use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
 

@@ -7,13 +7,16 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "BadCamera",
     "Camera",
+    "CameraServo",
     "Candidate",
+    "Command",
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
     "NoPose",
     "NotFinite",
     "QuestError",
+    "RobotServo",
     "RunnerUp",
     "ShapeMismatch",
     "TooFewMatches",
@@ -260,3 +263,69 @@ def _runner_up(state: tuple[Any, ...]) -> RunnerUp: ...
 def constraint_matrix(x1: ArrayLike, x2: ArrayLike) -> _Array: ...
 def _candidate(state: tuple[Any, ...]) -> Candidate: ...
 def _solvers() -> list[tuple[str, int, int, str]]: ...
+
+@final
+class Command:
+    @property
+    def linear(self) -> _Array: ...
+    @property
+    def angular(self) -> _Array: ...
+    @property
+    def speed(self) -> float: ...
+    @property
+    def turn_rate(self) -> float: ...
+    @property
+    def state(
+        self,
+    ) -> Literal[
+        "tracking", "starting", "too_few_features", "degenerate", "inconsistent", "jump", "uncertain"
+    ]: ...
+    @property
+    def R(self) -> _Array | None: ...
+    @property
+    def t(self) -> _Array | None: ...
+    @property
+    def inliers(self) -> int: ...
+
+@final
+class CameraServo:
+    def __new__(
+        cls,
+        goal: ArrayLike,
+        camera: Camera | ArrayLike | None = None,
+        *,
+        max_speed: float,
+        max_turn_rate: float,
+        noise: float,
+        goal_images: int = 1,
+        period: float = 0.1,
+        unit: float = 1.0,
+        rate: float = 0.5,
+        depths: ArrayLike | None = None,
+        solver: str | None = None,
+    ) -> CameraServo: ...
+    def step(self, points: ArrayLike, /) -> Command: ...
+
+@final
+class RobotServo:
+    def __new__(
+        cls,
+        goal: ArrayLike,
+        camera: Camera | ArrayLike | None = None,
+        *,
+        max_speed: float,
+        max_turn_rate: float,
+        noise: float,
+        goal_images: int = 1,
+        period: float = 0.1,
+        unit: float = 1.0,
+        speed_gain: float = 0.5,
+        turn_gain: float = 1.0,
+        tilt: float = 0.01,
+        border: float = 40.0,
+        depths: ArrayLike | None = None,
+        solver: str | None = None,
+    ) -> RobotServo: ...
+    def step(self, points: ArrayLike, /) -> Command: ...
+    @property
+    def has_arrived(self) -> bool: ...
