@@ -57,6 +57,7 @@ pub mod candidate;
 pub mod conventions {}
 pub mod correspondence;
 mod degeneracy;
+mod epipolar_frame;
 pub mod feasibility;
 pub mod pose;
 pub mod quaternion;

@@ -120,12 +120,13 @@ impl RelativePose {
     }
 }
 
+/// The largest Sampson error: no bearing has to turn by more.
+pub(crate) const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+
 /// The squared Sampson error of the constraint `e = t · (b × c)` of unit vectors, by `t · b` and `t · c`.
 #[inline]
 pub(crate) fn sampson_square(e: f64, tb: f64, tc: f64) -> f64 {
-    // The squared gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e; no
-    // bearing has to turn by more than a right angle.
-    const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+    // The squared gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e.
     let gradient2 = 2.0 - tb * tb - tc * tc - 2.0 * e * e;
     (e * e / gradient2.max(f64::MIN_POSITIVE)).min(RIGHT_ANGLE * RIGHT_ANGLE)
 }

@@ -10,7 +10,7 @@
 //! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
 //! `|t|` is then the parallax (63), and goes to zero with it.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::pose::{PARALLEL, sampson_square};
@@ -52,36 +52,118 @@ pub fn with_depths(
     matches: &[Correspondence],
 ) -> Completed {
     let r_21 = q_21.to_rotation_matrix();
-    let (mut front, mut behind, mut at_infinity) = (0, 0, 0);
-    let (mut absolute, mut signed, mut squares, mut count) = (0.0, 0.0, 0.0, 0);
+    let (mut squares, mut tally) = (0.0, Tally::default());
     for m in matches {
-        let (b, c) = (m.bearing2(), r_21 * m.bearing1());
-        let n = b.cross(&c);
-        let nn = n.norm_squared();
-        let (tb, tc, bc) = (direction.dot(b), direction.dot(&c), b.dot(&c));
-        squares += sampson_square(direction.dot(&n), tb, tc);
-        if nn <= PARALLEL * PARALLEL {
-            at_infinity += usize::from(bc > 0.0);
-            continue;
+        let rays = Rays::new(m.bearing2(), &(r_21 * m.bearing1()), direction);
+        squares += rays.sampson_square(direction);
+        tally.add(&rays, m);
+    }
+    tally.completed(q_21, direction, squares, matches)
+}
+
+/// The same for `q_21` and for its twisted partner `t ⊗ q`, which has the same residuals.
+pub(crate) fn pair_with_depths(
+    q_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> [Completed; 2] {
+    let r_21 = q_21.to_rotation_matrix();
+    let (mut squares, mut first, mut second) = (0.0, Tally::default(), Tally::default());
+    for m in matches {
+        let rays = Rays::new(m.bearing2(), &(r_21 * m.bearing1()), direction);
+        squares += rays.sampson_square(direction);
+        first.add(&rays, m);
+        second.add(&rays.twisted(m.bearing2(), direction), m);
+    }
+    let twisted = UnitQuaternion::new_normalize(Quaternion::from_imag(*direction) * q_21.into_inner());
+    [
+        first.completed(q_21, direction, squares, matches),
+        second.completed(twisted, direction, squares, matches),
+    ]
+}
+
+/// What is needed of the two rays of a match, `b` of view 2 and `c` of view 1 after the rotation.
+struct Rays {
+    /// `b × c`.
+    normal: Vector3<f64>,
+    /// `b · c`.
+    cosine: f64,
+    /// `t · b` and `t · c`.
+    along: [f64; 2],
+}
+
+impl Rays {
+    #[inline]
+    fn new(b: &Vector3<f64>, c: &Vector3<f64>, direction: &Vector3<f64>) -> Self {
+        Self { normal: b.cross(c), cosine: b.dot(c), along: [direction.dot(b), direction.dot(c)] }
+    }
+
+    /// With `c` turned by 180° about the translation, `c' = 2 t (t · c) − c`.
+    #[inline]
+    fn twisted(&self, b: &Vector3<f64>, direction: &Vector3<f64>) -> Self {
+        let [tb, tc] = self.along;
+        Self {
+            normal: b.cross(direction) * (2.0 * tc) - self.normal,
+            cosine: 2.0 * tb * tc - self.cosine,
+            along: self.along,
+        }
+    }
+
+    #[inline]
+    fn sampson_square(&self, direction: &Vector3<f64>) -> f64 {
+        sampson_square(direction.dot(&self.normal), self.along[0], self.along[1])
+    }
+}
+
+/// What the matches say of the sign and the length of a translation.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    front: usize,
+    behind: usize,
+    /// Matches with parallel rays, and those of them whose rays point the same way.
+    parallel: usize,
+    at_infinity: usize,
+    /// The sum of the depths, each before its division, and that of their absolute values.
+    signed: f64,
+    absolute: f64,
+}
+
+impl Tally {
+    #[inline]
+    fn add(&mut self, rays: &Rays, m: &Correspondence) {
+        let (square, cosine, [tb, tc]) = (rays.normal.norm_squared(), rays.cosine, rays.along);
+        if square <= PARALLEL * PARALLEL {
+            self.parallel += 1;
+            self.at_infinity += usize::from(cosine > 0.0);
+            return;
         }
         // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
-        let (area1, area2) = (bc * tb - tc, tb - bc * tc);
-        front += usize::from(area1 > 0.0 && area2 > 0.0);
-        behind += usize::from(area1 < 0.0 && area2 < 0.0);
-        signed += area1 + area2;
+        let (area1, area2) = (cosine * tb - tc, tb - cosine * tc);
+        self.front += usize::from(area1 > 0.0 && area2 > 0.0);
+        self.behind += usize::from(area1 < 0.0 && area2 < 0.0);
+        self.signed += area1 + area2;
         let (length1, length2) = (m.length1(), m.length2());
-        count += 2;
-        absolute += (area1.abs() * length2 + area2.abs() * length1) / (nn * length1 * length2);
+        self.absolute += (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
     }
-    let residual = (squares / matches.len().max(1) as f64).sqrt();
-    if absolute == 0.0 {
-        let pose = RelativePose::new(q_21, Vector3::zeros());
-        return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
+
+    fn completed(
+        &self,
+        q_21: UnitQuaternion<f64>,
+        direction: &Vector3<f64>,
+        squares: f64,
+        matches: &[Correspondence],
+    ) -> Completed {
+        if self.absolute == 0.0 {
+            let pose = RelativePose::new(q_21, Vector3::zeros());
+            return Completed { pose, in_front: self.at_infinity, residual: pose.residual(matches) };
+        }
+        let Self { front, behind, .. } = *self;
+        let flip = behind > front || (behind == front && self.signed < 0.0);
+        let length = 2.0 * (matches.len() - self.parallel) as f64 / self.absolute;
+        let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
+        let residual = (squares / matches.len() as f64).sqrt();
+        Completed { pose, in_front: self.at_infinity + if flip { behind } else { front }, residual }
     }
-    let flip = behind > front || (behind == front && signed < 0.0);
-    let length = f64::from(count) / absolute;
-    let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
-    Completed { pose, in_front: at_infinity + if flip { behind } else { front }, residual }
 }
 
 #[cfg(test)]
@@ -104,13 +186,13 @@ mod tests {
     /// The null vector of (58), (59) by SVD, from the quaternion equations (32) as printed.
     fn null_vector_of_59(q_21: &UnitQuaternion<f64>, matches: &[Correspondence]) -> [f64; 13] {
         let mut b = SMatrix::<f64, 20, 13>::zeros();
-        let column = |q: nalgebra::Quaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
+        let column = |q: Quaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
         let q = q_21.quaternion();
         for (i, m) in matches.iter().enumerate() {
-            let m1 = nalgebra::Quaternion::from_imag(m.bearing1() * m.length1());
-            let m2 = nalgebra::Quaternion::from_imag(m.bearing2() * m.length2());
+            let m1 = Quaternion::from_imag(m.bearing1() * m.length1());
+            let m2 = Quaternion::from_imag(m.bearing2() * m.length2());
             for k in 0..3 {
-                let e = nalgebra::Quaternion::from_imag(Vector3::ith(k, 1.0));
+                let e = Quaternion::from_imag(Vector3::ith(k, 1.0));
                 b.fixed_view_mut::<4, 1>(4 * i, k).copy_from(&column(e * q));
             }
             b.fixed_view_mut::<4, 1>(4 * i, 3 + 2 * i).copy_from(&column(q * m1));

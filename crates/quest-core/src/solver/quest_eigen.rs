@@ -25,12 +25,12 @@
 
 use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 
-use super::aligned::{Alignment, Gram};
+use super::aligned::{Alignment, Coordinates};
 use super::essential::real_part;
+use super::gram::Gram;
 use super::motion::Motion;
-use super::quest::motions_of_five;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver, consensus};
+use super::{Kinds, PoseSolver, minima};
 use crate::algebra::monomials::position;
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
@@ -58,15 +58,12 @@ impl PoseSolver for QuestEigen {
         if matches.len() < Self::MIN_MATCHES {
             return out.set_degeneracy(Degeneracy::TooFewMatches);
         }
+        let Ok(five) = matches.try_into() else { return minima::solve(self.kinds, matches, starts, out) };
         let alignment = Alignment::new(matches);
         if alignment.is_pure_rotation() {
             return pure_rotation(&alignment, matches, out);
         }
-        let found = match matches.try_into() {
-            Ok(five) => from_five(&alignment, five),
-            Err(_) => from_many(&alignment, matches),
-        };
-        match found {
+        match from_five(&alignment, five) {
             Err(degeneracy) => out.set_degeneracy(degeneracy),
             Ok(shortlist) => {
                 if self.kinds == Kinds::All {
@@ -94,23 +91,20 @@ fn from_five(alignment: &Alignment, matches: &[Correspondence; 5]) -> Result<Sho
     Ok(shortlist)
 }
 
-/// The local minima over more than five matches.
-fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(alignment, matches);
-    let [leading @ .., _, _, _, _] = gram.principal_basis(matches)?;
+/// The solutions of the five constraints that stand for all matches.
+fn starts(gram: &Gram, [n1, n2, n3, n4, n5, ..]: &[Coordinates; 9]) -> Shortlist {
     let mut starts = Shortlist::new();
     let g = pre_rotation(PRE_ROTATIONS[0]);
-    let m = leading.map(|row| bilinear(&(g.to_rotation_matrix() * alignment.constraint(&row))));
+    let turned = |row| bilinear(&(g.to_rotation_matrix() * gram.alignment.constraint(row)));
+    let m = [n1, n2, n3, n4, n5].map(turned);
     if let Some(spectrum) = Spectrum::new(&minors_with_q(&m), &minors_without_q(&m)) {
         for value in spectrum.values {
             if let Some((kind, q_21)) = spectrum.rotation(value, &g) {
-                starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
+                starts.push(kind, Motion { q_21, direction: gram.direction(&q_21) });
             }
         }
     }
-    let mut refined = starts.refined(&gram, matches);
-    consensus::add(&mut refined, matches, motions_of_five);
-    Ok(refined)
+    starts
 }
 
 fn pre_rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
