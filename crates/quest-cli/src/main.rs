@@ -49,6 +49,8 @@ enum Failure {
     Read(#[from] quest_io::ReadError),
     #[error(transparent)]
     Write(#[from] quest_io::WriteError),
+    #[error(transparent)]
+    Scene(#[from] quest_core::simulate::SceneError),
 }
 
 fn main() -> ExitCode {

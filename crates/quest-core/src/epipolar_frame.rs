@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Correspondence;
+use crate::algebra::two::{TwoVectors, times};
 
 /// A rotation `F` of view 2 that takes the direction of the translation to the third axis.
 ///
@@ -34,6 +35,18 @@ impl EpipolarFrame {
     #[inline]
     pub(crate) fn bearings(&self, m: &Correspondence) -> ([f64; 3], [f64; 3]) {
         ((self.from_2 * m.bearing2()).into(), (self.from_1 * m.bearing1()).into())
+    }
+
+    /// Two bearings `b` of view 2.
+    #[inline]
+    pub(crate) fn from_view2(&self, bearings: &TwoVectors) -> TwoVectors {
+        times(&self.from_2, bearings)
+    }
+
+    /// The bearings `c` of two of view 1, after the rotation.
+    #[inline]
+    pub(crate) fn from_view1(&self, bearings: &TwoVectors) -> TwoVectors {
+        times(&self.from_1, bearings)
     }
 
     /// A vector of this frame in the frame of camera 2.

@@ -13,7 +13,8 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::smallest_eigenvector_3;
-use crate::pose::{PARALLEL, sampson_square};
+use crate::algebra::two::{Two, TwoVectors, both, count, cross, dot, side_by_side, times};
+use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
 
 /// The direction of the translation that fits the rotation best: the eigenvector of `Σ n nᵀ` with the smallest
@@ -51,12 +52,12 @@ pub fn with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Completed {
-    let r_21 = q_21.to_rotation_matrix();
+    let r_21 = q_21.to_rotation_matrix().into_inner();
     let (mut squares, mut tally) = (0.0, Tally::default());
-    for m in matches {
-        let rays = Rays::new(m.bearing2(), &(r_21 * m.bearing1()), direction);
-        squares += rays.sampson_square(direction);
-        tally.add(&rays, m);
+    for pair in matches.chunks(2) {
+        let (rays, _) = Rays::new(pair, &r_21, direction);
+        squares += rays.sampson_squares(direction);
+        tally.add(&rays, pair);
     }
     tally.completed(q_21, direction, squares, matches)
 }
@@ -67,13 +68,13 @@ pub(crate) fn pair_with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> [Completed; 2] {
-    let r_21 = q_21.to_rotation_matrix();
+    let r_21 = q_21.to_rotation_matrix().into_inner();
     let (mut squares, mut first, mut second) = (0.0, Tally::default(), Tally::default());
-    for m in matches {
-        let rays = Rays::new(m.bearing2(), &(r_21 * m.bearing1()), direction);
-        squares += rays.sampson_square(direction);
-        first.add(&rays, m);
-        second.add(&rays.twisted(m.bearing2(), direction), m);
+    for pair in matches.chunks(2) {
+        let (rays, b) = Rays::new(pair, &r_21, direction);
+        squares += rays.sampson_squares(direction);
+        first.add(&rays, pair);
+        second.add(&rays.twisted(&b, direction), pair);
     }
     let twisted = UnitQuaternion::new_normalize(Quaternion::from_imag(*direction) * q_21.into_inner());
     [
@@ -82,36 +83,44 @@ pub(crate) fn pair_with_depths(
     ]
 }
 
-/// What is needed of the two rays of a match, `b` of view 2 and `c` of view 1 after the rotation.
+/// What is needed of the rays of two matches (of one, and zeros), `b` of view 2 and `c` of view 1 after the rotation.
 struct Rays {
     /// `b × c`.
-    normal: Vector3<f64>,
+    normal: TwoVectors,
     /// `b · c`.
-    cosine: f64,
+    cosine: Two,
     /// `t · b` and `t · c`.
-    along: [f64; 2],
+    along: [Two; 2],
 }
 
 impl Rays {
+    /// Together with `b`.
     #[inline]
-    fn new(b: &Vector3<f64>, c: &Vector3<f64>, direction: &Vector3<f64>) -> Self {
-        Self { normal: b.cross(c), cosine: b.dot(c), along: [direction.dot(b), direction.dot(c)] }
+    fn new(pair: &[Correspondence], r_21: &Matrix3<f64>, direction: &Vector3<f64>) -> (Self, TwoVectors) {
+        let second = pair.get(1);
+        let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
+        let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
+        let (c, t) = (times(r_21, &a), both(direction));
+        (Self { normal: cross(&b, &c), cosine: dot(&b, &c), along: [dot(&t, &b), dot(&t, &c)] }, b)
     }
 
     /// With `c` turned by 180° about the translation, `c' = 2 t (t · c) − c`.
     #[inline]
-    fn twisted(&self, b: &Vector3<f64>, direction: &Vector3<f64>) -> Self {
-        let [tb, tc] = self.along;
+    fn twisted(&self, b: &TwoVectors, direction: &Vector3<f64>) -> Self {
+        let ([tb, tc], across) = (self.along, cross(b, &both(direction)));
+        let twice = tc + tc;
         Self {
-            normal: b.cross(direction) * (2.0 * tc) - self.normal,
-            cosine: 2.0 * tb * tc - self.cosine,
+            normal: std::array::from_fn(|k| across[k] * twice - self.normal[k]),
+            cosine: tb * twice - self.cosine,
             along: self.along,
         }
     }
 
+    /// The sum of the squared Sampson errors.
     #[inline]
-    fn sampson_square(&self, direction: &Vector3<f64>) -> f64 {
-        sampson_square(direction.dot(&self.normal), self.along[0], self.along[1])
+    fn sampson_squares(&self, direction: &Vector3<f64>) -> f64 {
+        let (e, [tb, tc]) = (dot(&both(direction), &self.normal), self.along);
+        sampson_squares(e, tb, tc).reduce_add()
     }
 }
 
@@ -120,8 +129,9 @@ impl Rays {
 struct Tally {
     front: usize,
     behind: usize,
-    /// Matches with parallel rays, and those of them whose rays point the same way.
-    parallel: usize,
+    /// Matches whose rays are not parallel.
+    with_depth: usize,
+    /// Matches whose rays are parallel and point the same way.
     at_infinity: usize,
     /// The sum of the depths, each before its division, and that of their absolute values.
     signed: f64,
@@ -130,20 +140,23 @@ struct Tally {
 
 impl Tally {
     #[inline]
-    fn add(&mut self, rays: &Rays, m: &Correspondence) {
-        let (square, cosine, [tb, tc]) = (rays.normal.norm_squared(), rays.cosine, rays.along);
-        if square <= PARALLEL * PARALLEL {
-            self.parallel += 1;
-            self.at_infinity += usize::from(cosine > 0.0);
-            return;
-        }
+    fn add(&mut self, rays: &Rays, pair: &[Correspondence]) {
+        let (cosine, [tb, tc]) = (rays.cosine, rays.along);
+        let square = dot(&rays.normal, &rays.normal);
         // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
         let (area1, area2) = (cosine * tb - tc, tb - cosine * tc);
-        self.front += usize::from(area1 > 0.0 && area2 > 0.0);
-        self.behind += usize::from(area1 < 0.0 && area2 < 0.0);
-        self.signed += area1 + area2;
-        let (length1, length2) = (m.length1(), m.length2());
-        self.absolute += (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
+        let lengths = |of: fn(&Correspondence) -> f64| Two::new([of(&pair[0]), pair.get(1).map_or(1.0, of)]);
+        let (length1, length2) = (lengths(Correspondence::length1), lengths(Correspondence::length2));
+        let depths = (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
+        let is_apart = square.simd_gt(Two::splat(PARALLEL * PARALLEL));
+        let above = [area1, area2].map(|area| area.simd_gt(Two::ZERO));
+        let below = [area1, area2].map(|area| area.simd_lt(Two::ZERO));
+        self.with_depth += count(is_apart);
+        self.front += count(is_apart & above[0] & above[1]);
+        self.behind += count(is_apart & below[0] & below[1]);
+        self.at_infinity += count(!is_apart & cosine.simd_gt(Two::ZERO));
+        self.signed += (is_apart & (area1 + area2)).reduce_add();
+        self.absolute += (is_apart & depths).reduce_add();
     }
 
     fn completed(
@@ -159,7 +172,7 @@ impl Tally {
         }
         let Self { front, behind, .. } = *self;
         let flip = behind > front || (behind == front && self.signed < 0.0);
-        let length = 2.0 * (matches.len() - self.parallel) as f64 / self.absolute;
+        let length = 2.0 * self.with_depth as f64 / self.absolute;
         let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
         let residual = (squares / matches.len() as f64).sqrt();
         Completed { pose, in_front: self.at_infinity + if flip { behind } else { front }, residual }

@@ -15,19 +15,14 @@ use super::shortlist::Shortlist;
 use crate::{CandidateKind, Correspondence};
 
 /// No correct match is further than this from its epipolar plane: four pixels at a focal length of a thousand.
-const AGREEMENT: f64 = 4e-3;
+pub(crate) const AGREEMENT: f64 = 4e-3;
 
 /// How many fives are tried. With 70 % correct matches one of them is all correct in 99 of 100 cases.
 const FIVES: usize = 24;
 
-/// Adds the motion on which most matches agree, if no motion in the list fits them all.
+/// Adds the motion on which most matches agree.
 pub(crate) fn add(shortlist: &mut Shortlist, matches: &[Correspondence]) {
     let cost = |motion: &Motion| motion.truncated_cost(matches, AGREEMENT);
-    let untruncated = |motion: &Motion| motion.truncated_cost(matches, f64::INFINITY);
-    let all_agree = matches.len() as f64 * AGREEMENT * AGREEMENT;
-    if shortlist.iter().any(|item| untruncated(&item.motion) < all_agree) {
-        return;
-    }
     // The same fives for the same matches, every time.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut best: Option<(f64, Motion)> = None;

@@ -7,6 +7,7 @@ use super::aligned::{Alignment, Coordinates, GRAM_DEPENDENT};
 use super::least_squares::principal_axes;
 use super::motion::{Motion, damped_step};
 use crate::algebra::symmetric::smallest_eigenvector_3;
+use crate::algebra::two::{self, Two, side_by_side};
 use crate::alignment::rotation_of_outer_sum;
 use crate::degeneracy::diagnose;
 use crate::epipolar_frame::EpipolarFrame;
@@ -265,25 +266,31 @@ impl Moments {
     /// and the orientation.
     fn new(matches: &[Correspondence]) -> Option<Self> {
         let first = matches.first()?;
-        let (mut outer, mut products) = ([[0.0; 3]; 3], [[0.0; 6]; 6]);
-        let mut opposite = false;
-        for m in matches {
-            let (b, a) = (m.bearing2(), m.bearing1());
-            opposite |= first.bearing1().dot(a) * first.bearing2().dot(b) < 0.0;
-            let [bb, aa] = [b, a].map(|x| PRODUCTS.map(|(i, j)| x[i] * x[j]));
+        let ahead1 = side_by_side(first.bearing1(), Some(first.bearing1()));
+        let ahead2 = side_by_side(first.bearing2(), Some(first.bearing2()));
+        let (mut outer, mut products) = ([[Two::ZERO; 3]; 3], [[Two::ZERO; 6]; 6]);
+        let mut opposite = Two::ZERO;
+        for pair in matches.chunks(2) {
+            let second = pair.get(1);
+            let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
+            let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
+            let signs = two::dot(&ahead1, &a) * two::dot(&ahead2, &b);
+            opposite = opposite | signs.simd_lt(Two::ZERO);
             for i in 0..3 {
                 for j in 0..3 {
-                    outer[i][j] += b[i] * a[j];
+                    outer[i][j] = outer[i][j] + b[i] * a[j];
                 }
             }
+            let [bb, aa] = [b, a].map(|x| PRODUCTS.map(|(i, j)| x[i] * x[j]));
             for i in 0..6 {
                 for j in 0..6 {
-                    products[i][j] += bb[i] * aa[j];
+                    products[i][j] = products[i][j] + bb[i] * aa[j];
                 }
             }
         }
-        let outer = Matrix3::from_fn(|i, j| outer[i][j]);
-        (!opposite && outer.determinant() >= 0.0).then_some(Self { outer, products })
+        let outer = Matrix3::from_fn(|i, j| outer[i][j].reduce_add());
+        let products = products.map(|row| row.map(Two::reduce_add));
+        (!opposite.any() && outer.determinant() >= 0.0).then_some(Self { outer, products })
     }
 
     /// `Σ y yᵀ` over the rows `y = [c × b, sym(b cᵀ)]`, `c = R0 a`.

@@ -14,6 +14,7 @@ use nalgebra::{Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 use super::aligned::Alignment;
 use crate::Correspondence;
 use crate::algebra::elimination;
+use crate::algebra::two::{Two, TwoVectors, side_by_side};
 use crate::epipolar_frame::{EpipolarFrame, tangent_basis};
 use crate::pose::{RIGHT_ANGLE, sampson_square};
 
@@ -72,7 +73,6 @@ impl Motion {
     }
 
     /// The essential matrix `[t]× R`.
-    #[cfg(test)]
     pub(crate) fn essential(&self) -> nalgebra::Matrix3<f64> {
         self.direction.cross_matrix() * self.q_21.to_rotation_matrix().into_inner()
     }
@@ -96,6 +96,13 @@ impl Motion {
         // To first order a rotation by ω; any step of the iteration may differ from it to second order.
         let q = Quaternion::from_parts(1.0, turn * 0.5) * self.q_21.into_inner();
         Self { q_21: UnitQuaternion::new_normalize(q), direction: (self.direction + by).normalize() }
+    }
+
+    /// By how much the motion misses the constraints of five matches: the largest `|t · (b × c)|`.
+    pub(crate) fn largest_sine(&self, matches: &[Correspondence; 5]) -> f64 {
+        let essential = self.essential();
+        let sines = matches.each_ref().map(|m| m.bearing2().dot(&(essential * m.bearing1())).abs());
+        sines.into_iter().fold(0.0, f64::max)
     }
 
     /// Newton's iteration to the solution of five constraints.
@@ -128,8 +135,13 @@ impl Motion {
     }
 
     /// Levenberg–Marquardt to a local minimum of the summed squares of the Sampson errors. Matches further than `cutoff`
-    /// (radians) from the epipolar constraint weigh nothing.
-    pub(crate) fn minimise_sampson(&mut self, matches: &[Correspondence], cutoff: f64, max_steps: usize) {
+    /// (radians) from the epipolar constraint weigh nothing. Returns the sum before the last step.
+    pub(crate) fn minimise_sampson(
+        &mut self,
+        matches: &[Correspondence],
+        cutoff: f64,
+        max_steps: usize,
+    ) -> f64 {
         let beyond = matches.len().saturating_sub(5).max(1) as f64;
         let mut damping = 0.0;
         let mut current = self.sampson_equations(matches, cutoff);
@@ -153,44 +165,48 @@ impl Motion {
                 }
             }
         }
+        current.cost
     }
 
     /// The sum of the squared Sampson errors, none of them counted beyond `cutoff`, and the equations of a step.
     fn sampson_equations(&self, matches: &[Correspondence], cutoff: f64) -> Equations {
         let frame = self.frame();
         let limit = cutoff.min(RIGHT_ANGLE).powi(2);
-        let (mut cost, mut sums) = (0.0, [[0.0; 6]; 5]);
-        for m in matches {
-            let (b, c) = frame.bearings(m);
-            let (e, along) = constraint(&(b, c));
+        let (mut cost, mut sums) = (0.0, [[Two::ZERO; 6]; 5]);
+        for pair in matches.chunks(2) {
+            let second = pair.get(1);
+            let b = frame.from_view2(&side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2)));
+            let c = frame.from_view1(&side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1)));
+            let (e, along) = constraint(&b, &c);
             // r = e / √g with g = 2 − (t·b)² − (t·c)² − 2 e², so that
             // dr = ((1 + 2 e²/g) de + (e/g) (t·b d(t·b) + t·c d(t·c))) / √g.
-            let g = 2.0 - b[2] * b[2] - c[2] * c[2] - 2.0 * e * e;
-            let over_g = 1.0 / g;
+            let g = Two::splat(2.0) - b[2] * b[2] - c[2] * c[2] - Two::splat(2.0) * e * e;
+            let over_g = Two::splat(1.0) / g;
             let square = e * e * over_g;
-            if square < limit && g > AT_EPIPOLE {
-                cost += square;
-                let (scale, bend) = (1.0 + 2.0 * square, e * over_g);
-                let row = [
-                    scale * along[0] + bend * (c[2] * c[1]),
-                    scale * along[1] - bend * (c[2] * c[0]),
-                    scale * along[2],
-                    scale * along[3] + bend * (b[2] * b[0] + c[2] * c[0]),
-                    scale * along[4] + bend * (b[2] * b[1] + c[2] * c[1]),
-                    e,
-                ];
-                for i in 0..5 {
-                    let weighted = over_g * row[i];
-                    for j in 0..6 {
-                        sums[i][j] += weighted * row[j];
-                    }
+            let counts = square.simd_lt(Two::splat(limit)) & g.simd_gt(Two::splat(AT_EPIPOLE));
+            let over_g = over_g & counts;
+            cost += (square & counts).reduce_add();
+            if !counts.all() {
+                cost += beyond(e & !counts, b[2], c[2], limit);
+            }
+            let (scale, bend) = (Two::splat(1.0) + Two::splat(2.0) * square, e * over_g);
+            let row = [
+                scale * along[0] + bend * (c[2] * c[1]),
+                scale * along[1] - bend * (c[2] * c[0]),
+                scale * along[2],
+                scale * along[3] + bend * (b[2] * b[0] + c[2] * c[0]),
+                scale * along[4] + bend * (b[2] * b[1] + c[2] * c[1]),
+                e,
+            ];
+            for i in 0..5 {
+                let weighted = over_g * row[i];
+                for j in i..6 {
+                    sums[i][j] = sums[i][j] + weighted * row[j];
                 }
-            } else {
-                cost += sampson_square(e, b[2], c[2]).min(limit);
             }
         }
-        let hessian = Matrix5::from_fn(|i, j| sums[i][j]);
-        Equations { frame, cost, hessian, gradient: Vector5::from_fn(|i, _| sums[i][5]) }
+        let hessian = Matrix5::from_fn(|i, j| sums[i.min(j)][i.max(j)].reduce_add());
+        Equations { frame, cost, hessian, gradient: Vector5::from_fn(|i, _| sums[i][5].reduce_add()) }
     }
 
     /// The sum of the squared Sampson errors, none of them counted beyond `cutoff`.
@@ -222,9 +238,16 @@ struct Equations {
     gradient: Vector5<f64>,
 }
 
-/// The residual of bearings `(b, c)` in the epipolar frame, and its derivative by the five parameters.
+/// The squared Sampson errors of two constraints, none of them counted beyond `limit`.
+#[cold]
+fn beyond(e: Two, tb: Two, tc: Two, limit: f64) -> f64 {
+    let [e, tb, tc] = [e, tb, tc].map(Two::to_array);
+    (0..2).map(|k| sampson_square(e[k], tb[k], tc[k]).min(limit)).sum()
+}
+
+/// The residuals of two matches by their bearings in the epipolar frame, and their derivatives by the five parameters.
 #[inline]
-fn constraint((b, c): &([f64; 3], [f64; 3])) -> (f64, [f64; 5]) {
+fn constraint(b: &TwoVectors, c: &TwoVectors) -> (Two, [Two; 5]) {
     let derivative = [
         -b[0] * c[2],
         -b[1] * c[2],
@@ -267,7 +290,9 @@ mod tests {
             let c = motion.q_21 * m.bearing1();
             motion.direction.dot(&m.bearing2().cross(&c))
         };
-        let (at, gradient) = constraint(&frame.bearings(&m));
+        let (b, c) = (side_by_side(m.bearing2(), None), side_by_side(m.bearing1(), None));
+        let (at, gradient) = constraint(&frame.from_view2(&b), &frame.from_view1(&c));
+        let (at, gradient) = (at.to_array()[0], gradient.map(|g| g.to_array()[0]));
         assert!((at - residual(&motion)).abs() < 1e-15);
         let h = 1e-6;
         for k in 0..5 {

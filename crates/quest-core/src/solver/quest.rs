@@ -29,8 +29,8 @@ use super::cubics::{Resultant, combine};
 use super::essential::{decompose, real_part, twisted};
 use super::gram::Gram;
 use super::motion::Motion;
-use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver, minima};
+use super::shortlist::Shortlist;
+use super::{Kinds, PoseSolver, refining};
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -44,27 +44,10 @@ pub struct Quest {
 
 impl PoseSolver for Quest {
     const NAME: &'static str = "quest";
-    const MIN_MATCHES: usize = 5;
+    const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        out.clear();
-        if matches.len() < Self::MIN_MATCHES {
-            return out.set_degeneracy(Degeneracy::TooFewMatches);
-        }
-        let Ok(five) = matches.try_into() else { return minima::solve(self.kinds, matches, starts, out) };
-        let alignment = Alignment::new(matches);
-        if alignment.is_pure_rotation() {
-            return pure_rotation(&alignment, matches, out);
-        }
-        match from_five(self.kinds, &alignment, five) {
-            Err(degeneracy) => out.set_degeneracy(degeneracy),
-            Ok(shortlist) => {
-                if self.kinds == Kinds::All {
-                    out.push(rotation_only(&alignment, matches));
-                }
-                shortlist.write(self.kinds, matches, out);
-            }
-        }
+        refining::solve(self.kinds, matches, out, from_five, starts);
     }
 }
 

@@ -8,7 +8,7 @@ use super::gram::Gram;
 use super::motion::{Motion, Outcome};
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
-use crate::structure::{Completed, pair_with_depths, translation_direction, with_depths};
+use crate::structure::{Completed, pair_with_depths, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -145,19 +145,20 @@ impl Shortlist {
         }
     }
 
-    /// The local minima of the squared Sampson errors over all matches that these motions lead to.
-    pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> Self {
+    /// The local minima of the summed squares of the Sampson errors over all matches that these motions lead to, and the
+    /// smallest sum.
+    pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> (Self, f64) {
         let mut coarse = Self { same: SAME_MINIMUM, ..Self::new() };
         for &Item { kind, mut motion, .. } in self.plausible(gram, &STARTS).iter() {
             gram.minimise(&mut motion);
             coarse.push_pair(kind, motion);
         }
-        let mut fine = Self { same: SAME_MINIMUM, ..Self::new() };
+        let (mut fine, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
         for &Item { kind, mut motion, .. } in coarse.plausible(gram, &MINIMA).iter() {
-            motion.minimise_sampson(matches, f64::INFINITY, 15);
+            smallest = motion.minimise_sampson(matches, f64::INFINITY, 15).min(smallest);
             fine.push_pair(kind, motion);
         }
-        fine
+        (fine, smallest)
     }
 
     /// Those whose costs are not too far above the smallest, the best first.
@@ -204,10 +205,13 @@ fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
     Candidate { kind, pose, residual, in_front }
 }
 
-/// The rotation-only candidate: the best alignment, and the translation that fits it best.
-pub(crate) fn rotation_only(alignment: &Alignment, matches: &[Correspondence]) -> Candidate {
-    let direction = translation_direction(&alignment.q0_21, matches);
-    candidate(CandidateKind::RotationOnly, &with_depths(alignment.q0_21, &direction, matches))
+/// The rotation-only candidate: the best alignment, and the direction of the translation that fits it best.
+pub(crate) fn rotation_only(
+    q0_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> Candidate {
+    candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
 /// The one candidate of an exact pure rotation, unless the matches leave that undetermined too.
