@@ -11,4 +11,6 @@ pub(crate) mod monomials;
 pub(crate) mod null_space;
 pub(crate) mod polynomial;
 pub(crate) mod singular;
+pub(crate) mod square_root;
 pub(crate) mod symmetric;
+pub(crate) mod two;

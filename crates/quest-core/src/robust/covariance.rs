@@ -12,7 +12,8 @@ use super::observations::Observations;
 use super::polish::SCALE;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
-use crate::solver::motion::{Motion, tangent_basis};
+use crate::epipolar_frame::tangent_basis;
+use crate::solver::motion::Motion;
 
 /// Parameters of a motion.
 const PARAMETERS: f64 = 5.0;
@@ -52,7 +53,7 @@ pub(super) fn of_pose(
         let at = |step: f64| {
             let mut steps = [0.0; 5];
             steps[k] = step;
-            length(observations, &motion.moved(&tangent, &steps), inliers, sigma).value
+            length(observations, &motion.stepped(&tangent, &steps), inliers, sigma).value
         };
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     });

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Correspondence;
-use crate::solver::motion::tangent_basis;
+use crate::epipolar_frame::tangent_basis;
 
 /// The columns are padded to a multiple of this.
 pub(super) const LANES: usize = 8;

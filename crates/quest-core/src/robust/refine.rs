@@ -8,7 +8,8 @@ use nalgebra::{Matrix3, Matrix5, Vector5};
 
 use super::loss::Loss;
 use super::observations::Observations;
-use crate::solver::motion::{Motion, damped_step, tangent_basis};
+use crate::epipolar_frame::tangent_basis;
+use crate::solver::motion::{Motion, damped_step};
 
 /// Matches that are worked on at once.
 const WIDTH: usize = 4;
@@ -196,7 +197,7 @@ pub(super) fn refine(
             }
             continue;
         };
-        let trial = motion.moved(&tangent_basis(&motion.direction), &step.into());
+        let trial = motion.stepped(&tangent_basis(&motion.direction), &step.into());
         let next = subset.equations(observations, &trial, loss);
         let gain = current.cost - next.cost;
         let is_short = step.norm_squared() < SHORT * SHORT;

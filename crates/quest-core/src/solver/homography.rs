@@ -35,11 +35,12 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::aligned::Alignment;
 use super::least_squares::{null_vector, outer};
-use super::motion::{Motion, tangent_basis};
+use super::motion::Motion;
 use super::normalisation::Normalisation;
 use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, PoseSolver};
 use crate::degeneracy::diagnose_fewer_than;
+use crate::epipolar_frame::tangent_basis;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// The motions of a plane; the steps stand at the head of the module.

@@ -7,6 +7,7 @@ pub mod eight_point;
 pub(crate) mod essential;
 pub(crate) mod essentials;
 mod five_point;
+mod gram;
 mod hidden_variable;
 pub mod homography;
 pub mod kneip;

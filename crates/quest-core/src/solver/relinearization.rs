@@ -32,20 +32,19 @@
 
 use nalgebra::{Complex, ComplexField, Matrix3, Matrix4, Quaternion, UnitQuaternion};
 
-use super::aligned::{Alignment, Gram};
+use super::aligned::Coordinates;
 use super::essential::real_part;
+use super::gram::Gram;
 use super::moments::Pencil;
 use super::motion::Motion;
-use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use super::twenty::from_five;
-use super::{Kinds, PoseSolver, consensus, refining};
+use super::{Kinds, PoseSolver, refining};
 use crate::algebra::monomials::{position, sum};
 use crate::algebra::singular::shortest_directions;
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
 use crate::quaternion::{bilinear, fifteen_minors_without_q, minors_with_q};
-use crate::structure::translation_direction;
-use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+use crate::{CandidateKind, Candidates, Correspondence};
 
 /// The relinearisation of sections 4.2 and 7.2 of the paper; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,22 +58,18 @@ impl PoseSolver for Relinearization {
     const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        refining::solve(self.kinds, matches, out, from_five::<Pencil>, from_many);
+        refining::solve(self.kinds, matches, out, from_five::<Pencil>, starts);
     }
 }
 
-/// The local minima over more than five matches next to the two solutions.
-fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(alignment, matches);
-    let [leading @ .., _, _, _] = gram.principal_basis(matches)?;
-    let rows = minors(&leading.map(|row| bilinear(&alignment.constraint(&row))));
+/// The two solutions of the six constraints that stand for all matches.
+fn starts(gram: &Gram, [n1, n2, n3, n4, n5, n6, ..]: &[Coordinates; 9]) -> Shortlist {
+    let m = [n1, n2, n3, n4, n5, n6].map(|row| bilinear(&gram.alignment.constraint(row)));
     let mut starts = Shortlist::new();
-    for (kind, q_21) in two_solutions(rows).into_iter().flatten() {
-        starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
+    for (kind, q_21) in two_solutions(minors(&m)).into_iter().flatten() {
+        starts.push(kind, Motion { q_21, direction: gram.direction(&q_21) });
     }
-    let mut refined = starts.refined(&gram, matches);
-    consensus::add(&mut refined, matches, motions_of_five);
-    Ok(refined)
+    starts
 }
 
 /// The 35 minors of `[q, M_1 q, …, M_6 q]`.
@@ -215,7 +210,7 @@ mod tests {
             for index in 0..100 {
                 let options = SceneOptions { points, ..SceneOptions::default() };
                 let scene = Scene::generate(&options, SEED, index).unwrap();
-                let rows = rows(&Alignment::new(&scene.matches), &scene.matches);
+                let rows = rows(&scene.matches);
                 let directions: [Quartic; 2] = shortest_directions(&mut rows.clone());
                 let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
                 for q in [truth.q_21, truth.twisted().q_21] {
@@ -236,8 +231,9 @@ mod tests {
         }
     }
 
-    fn rows(alignment: &Alignment, matches: &[Correspondence]) -> [Quartic; 35] {
-        let [leading @ .., _, _, _] = Gram::new(alignment, matches).principal_basis(matches).unwrap();
-        minors(&leading.map(|row| bilinear(&alignment.constraint(&row))))
+    fn rows(matches: &[Correspondence]) -> [Quartic; 35] {
+        let mut gram = Gram::aligned(matches);
+        let [leading @ .., _, _, _] = gram.principal_basis(matches).unwrap();
+        minors(&leading.map(|row| bilinear(&gram.alignment.constraint(&row))))
     }
 }
