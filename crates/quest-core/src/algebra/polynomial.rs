@@ -135,8 +135,8 @@ impl Bracket {
         let next = if inside { newton } else { 0.5 * (self.low + self.high) };
         let moved = (next - self.x).abs();
         self.x = next;
-        // Convergence is quadratic: a step of half the digits leaves none.
-        if moved <= 1e-7 * (1e-3 + next.abs()) {
+        // Convergence is quadratic: a step of a third of the digits leaves a third, the last one none.
+        if moved <= 1e-5 * (1e-3 + next.abs()) {
             let (value, slope) = value_and_slope(p, next);
             let last = next - value / slope;
             if (last - next).abs() <= moved {

@@ -15,12 +15,15 @@
 use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::null_space::null_space;
-use crate::alignment::{best_rotation, best_rotation_of_lines};
+use crate::alignment::{best_rotation, best_rotation_of_lines, nearly_best_rotation};
 use crate::degeneracy::diagnose;
 use crate::{Correspondence, Degeneracy};
 
 /// Bearings closer to aligned than this (root mean square of the sine) are a pure rotation to rounding.
 const NO_PARALLAX: f64 = 1e-13;
+
+/// With more parallax than this the last digits of the alignment do not matter: any rotation near it serves.
+const LARGE_PARALLAX: f64 = 1e-3;
 
 /// Constraints closer to dependent than this have no reliable solution: the smallest pivot of the
 /// rows is at most 1e-15 for collinear, coincident and repeated points, and above 1e-4 for ordinary ones.
@@ -43,7 +46,12 @@ pub(crate) struct Alignment {
 
 impl Alignment {
     pub(crate) fn new(matches: &[Correspondence]) -> Self {
-        let rays = Self::with_rotation(best_rotation(matches), matches);
+        let nearly = Self::with_rotation(nearly_best_rotation(matches), matches);
+        let rays = if nearly.parallax > LARGE_PARALLAX {
+            nearly
+        } else {
+            Self::with_rotation(best_rotation(matches), matches)
+        };
         // Bearings in a plane are aligned as lines just as well by another half turn: rounding must not choose that.
         if rays.is_pure_rotation() {
             return rays;

@@ -14,7 +14,7 @@ use nalgebra::{Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 use super::aligned::Alignment;
 use crate::Correspondence;
 use crate::algebra::elimination;
-use crate::algebra::two::{Two, TwoVectors, side_by_side};
+use crate::algebra::two::{Two, TwoVectors, both, cross, dot, side_by_side, times};
 use crate::epipolar_frame::{EpipolarFrame, tangent_basis};
 use crate::pose::{RIGHT_ANGLE, sampson_square};
 
@@ -129,12 +129,21 @@ impl Motion {
         for _ in 0..MAX_NEWTON_STEPS {
             let tangent = tangent_basis(&self.direction);
             let r_21 = self.q_21.to_rotation_matrix().into_inner();
-            let t = &self.direction;
-            let mut equations = matches.each_ref().map(|m| {
-                let (b, c) = (m.bearing2(), r_21 * m.bearing1());
-                let (n, g) = (b.cross(&c), t * b.dot(&c) - b * t.dot(&c));
-                [g.x, g.y, g.z, n.dot(&tangent[0]), n.dot(&tangent[1]), -n.dot(t)]
-            });
+            let [t, e1, e2] = [&self.direction, &tangent[0], &tangent[1]].map(both);
+            let mut equations = [[0.0; 6]; 5];
+            for (rows, pair) in equations.chunks_mut(2).zip(matches.chunks(2)) {
+                let second = pair.get(1);
+                let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
+                let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
+                let c = times(&r_21, &a);
+                let (n, bc, tc) = (cross(&b, &c), dot(&b, &c), dot(&t, &c));
+                let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
+                let entries = [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), -dot(&n, &t)];
+                let entries = entries.map(Two::to_array);
+                for (lane, row) in rows.iter_mut().enumerate() {
+                    *row = entries.map(|entry| entry[lane]);
+                }
+            }
             let Some(step) = elimination::solve(&mut equations) else { return Outcome::Stalled };
             let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
             if length > 1.0 {

@@ -144,7 +144,7 @@ impl<'a> Roots<'a> {
         let (resultant, pivot) = Resultant::new(basis, alignment.parallax);
         let polynomial = resultant.polynomial();
         let mut real = real_roots(&polynomial);
-        real.certain &= pivot > SMALL_PIVOT;
+        real.certain &= pivot > SMALL_PIVOT && !real.close;
         Self { basis, alignment, resultant, polynomial, real }
     }
 

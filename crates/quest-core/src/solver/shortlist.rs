@@ -228,9 +228,19 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
 fn rank(out: &mut Candidates) {
-    let key = |c: &Candidate| (c.residual.max(ROUNDING), -c.pose.wxyz()[0]);
-    out.as_mut_slice().sort_unstable_by(|x, y| {
-        let ((r, w), (s, v)) = (key(x), key(y));
-        y.in_front.cmp(&x.in_front).then(r.total_cmp(&s)).then(w.total_cmp(&v))
-    });
+    // Positive numbers are ordered as their bits are: keys are compared as integers, and candidates moved once.
+    let key = |(k, c): (usize, &Candidate)| {
+        let residual = c.residual.max(ROUNDING).to_bits();
+        (usize::MAX - c.in_front, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits(), k)
+    };
+    let mut order = [(0, 0, 0, 0); Candidates::CAPACITY];
+    let order = &mut order[..out.len()];
+    for (place, candidate) in order.iter_mut().zip(out.iter().enumerate()) {
+        *place = key(candidate);
+    }
+    order.sort_unstable();
+    let unordered = out.clone();
+    for (place, (.., k)) in out.as_mut_slice().iter_mut().zip(order) {
+        *place = unordered[*k];
+    }
 }
