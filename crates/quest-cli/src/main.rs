@@ -5,6 +5,7 @@
 mod candidate_table;
 mod options;
 mod rows;
+mod simulate;
 mod solve;
 mod solvers;
 mod table;
@@ -18,6 +19,7 @@ const EXAMPLES: &str = "\
 Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
   quest-cli solve --format json pair.json | jq     the same for programs
+  quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -33,6 +35,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Solve(Box<solve::Arguments>),
+    Simulate(Box<simulate::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -51,11 +54,17 @@ enum Failure {
     Write(#[from] quest_io::WriteError),
     #[error(transparent)]
     Scene(#[from] quest_core::simulate::SceneError),
+    #[error(transparent)]
+    Plot(#[from] quest_plot::PlotError),
+    /// Arguments that do not go together.
+    #[error("{0}")]
+    Arguments(String),
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

@@ -58,6 +58,7 @@ pub mod conventions {}
 pub mod correspondence;
 mod degeneracy;
 pub mod feasibility;
+pub mod lanes;
 pub mod pose;
 pub mod quaternion;
 pub mod simulate;

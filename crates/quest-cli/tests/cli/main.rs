@@ -6,6 +6,7 @@ mod candidates;
 mod formats;
 mod output;
 mod readme;
+mod simulate;
 
 use std::{
     fs,

@@ -4,7 +4,7 @@ mod aligned;
 mod consensus;
 mod cubics;
 pub mod eight_point;
-mod essential;
+pub(crate) mod essential;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
@@ -12,14 +12,18 @@ pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
+mod moments;
 mod motion;
 pub mod nister;
 mod normalisation;
 pub mod quest;
 pub mod quest_eigen;
+mod refining;
+pub mod relinearization;
 mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
+mod twenty;
 
 use std::str::FromStr;
 
@@ -31,6 +35,7 @@ pub use li_hartley::LiHartley;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+pub use relinearization::Relinearization;
 pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
@@ -65,6 +70,8 @@ pub enum SolverName {
     Quest,
     /// [`QuestEigen`].
     QuestEigen,
+    /// [`Relinearization`].
+    Relinearization,
     /// [`Nister`].
     Nister,
     /// [`Stewenius`].
@@ -107,6 +114,7 @@ impl SolverName {
     pub const ALL: [Self; 9] = [
         Self::Quest,
         Self::QuestEigen,
+        Self::Relinearization,
         Self::Nister,
         Self::Stewenius,
         Self::LiHartley,
@@ -131,6 +139,12 @@ impl SolverName {
                 min_matches: QuestEigen::MIN_MATCHES,
                 max_candidates: 21,
                 reference: "Fathian et al., RAS 2018, section 7.1",
+            },
+            Self::Relinearization => SolverInfo {
+                name: Relinearization::NAME,
+                min_matches: Relinearization::MIN_MATCHES,
+                max_candidates: 21,
+                reference: "Fathian et al., RAS 2018, section 7.2",
             },
             Self::Nister => SolverInfo {
                 name: Nister::NAME,
@@ -182,6 +196,7 @@ impl SolverName {
         match self {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+            Self::Relinearization => Relinearization { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
             Self::LiHartley => LiHartley { kinds }.solve(matches, out),
