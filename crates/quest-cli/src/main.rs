@@ -3,12 +3,14 @@
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+mod input;
 mod options;
 mod rows;
 mod simulate;
 mod solve;
 mod solvers;
 mod table;
+mod view;
 mod words;
 
 use std::process::ExitCode;
@@ -36,6 +38,7 @@ struct Arguments {
 enum Command {
     Solve(Box<solve::Arguments>),
     Simulate(Box<simulate::Arguments>),
+    View(view::Arguments),
     Solvers(solvers::Arguments),
 }
 
@@ -65,6 +68,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

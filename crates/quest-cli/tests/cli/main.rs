@@ -7,6 +7,7 @@ mod formats;
 mod output;
 mod readme;
 mod simulate;
+mod view;
 
 use std::{
     fs,
