@@ -80,6 +80,7 @@ class Peer:
 
 
 CAMERA = pycolmap.Camera(model="PINHOLE", width=1024, height=768, params=[1060, 1060, 514, 384])
+ONE_SAMPLE = pycolmap.RANSACOptions(min_num_trials=1, max_num_trials=1)
 
 
 def pixels(x: np.ndarray) -> np.ndarray:
@@ -106,13 +107,14 @@ def peers() -> list[Peer]:
         Peer(
             "OpenCV findEssentialMat, 5 points",
             unchanged,
-            lambda x1, x2: cv2.findEssentialMat(x1, x2, np.eye(3), method=cv2.RANSAC, threshold=1e-3),
+            # One sample is all there is.
+            lambda x1, x2: cv2.findEssentialMat(x1, x2, np.eye(3), method=cv2.RANSAC, threshold=1e-3, maxIters=1),
             lambda f: decomposed(opencv_matrices(f)),
         ),
         Peer(
             "pycolmap estimate_essential_matrix (one pose)",
             in_pixels,
-            lambda x1, x2: pycolmap.estimate_essential_matrix(x1, x2, CAMERA, CAMERA),
+            lambda x1, x2: pycolmap.estimate_essential_matrix(x1, x2, CAMERA, CAMERA, ONE_SAMPLE),
             of_colmap,
         ),
     ]

@@ -344,6 +344,14 @@ laws!(five_point kukelova: Subject {
     most_different: 0,
 });
 
+laws!(five_point kneip: Subject {
+    solver: SolverName::Kneip,
+    options: five_points(),
+    most_lost: [0, 0],
+    most_lost_of_more: 0,
+    most_different: 0,
+});
+
 laws!(common eight_point: Subject {
     solver: SolverName::EightPoint,
     options: SceneOptions { points: 8, ..five_points() },

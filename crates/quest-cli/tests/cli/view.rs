@@ -38,7 +38,12 @@ fn opened(page: &Path) -> Option<String> {
     let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser)
         .args(["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader"])
-        .args(["--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--virtual-time-budget=20000"])
+        .args([
+            "--enable-unsafe-swiftshader",
+            "--ignore-gpu-blocklist",
+            "--window-size=500,400",
+            "--virtual-time-budget=2000",
+        ])
         .args(["--enable-logging=stderr", "--v=0", "--dump-dom"])
         .arg(format!("--user-data-dir={}", profile.path().display()))
         .arg(format!("file://{}", probed.display()))
@@ -60,7 +65,7 @@ fn a_pair_is_shown_in_a_browser() {
         let page = directory.path().join("view.html");
         let found = run_in(
             directory.path(),
-            &["view", &example(name), "--all", "--solver", solver, "-o", "view.html"],
+            &["view", &example(name), "--all", "--quiet", "--solver", solver, "-o", "view.html"],
             b"",
         );
         assert_eq!((found.status, found.stdout.as_str(), found.stderr.as_str()), (0, "", ""));
@@ -74,7 +79,10 @@ fn a_pair_is_shown_in_a_browser() {
         );
         let candidates = ours.split("<tbody>").nth(1).unwrap().matches("<tr>").count();
         assert!(candidates > 1 && !ours.contains("NaN"));
-        if let Some(title) = opened(&page) {
+        // Once: to draw in three dimensions without a graphics card takes a browser seconds.
+        if name == "points.json"
+            && let Some(title) = opened(&page)
+        {
             // The scene and the residuals; a switch in each for each candidate, one for each other camera.
             let switches = 2 * candidates + 2;
             assert_eq!(title, format!("2 plots, {switches} switches, 1 canvases"), "{name}");

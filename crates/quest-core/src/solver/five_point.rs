@@ -50,8 +50,15 @@ pub(crate) fn solve(
         Err(degeneracy) => return out.set_degeneracy(degeneracy),
         Ok(basis) => basis,
     };
-    let mut solutions =
-        Solutions { basis, kinds, matches, doubtful: false, real: 0, shortlist: Shortlist::new() };
+    let mut solutions = Solutions {
+        basis,
+        kinds,
+        matches,
+        attempt: 0,
+        doubtful: false,
+        real: 0,
+        shortlist: Shortlist::new(),
+    };
     let mut solved = method(&mut solutions);
     for mixing in &MIXINGS {
         if solved && solutions.is_complete() {
@@ -92,10 +99,13 @@ pub(crate) struct Solutions<'a> {
     /// The four essential matrices that solutions are combinations of.
     pub(crate) basis: Basis,
     kinds: Kinds,
-    matches: &'a [Correspondence],
+    /// The matches.
+    pub(crate) matches: &'a [Correspondence],
+    /// How many bases came before this one.
+    pub(crate) attempt: usize,
     /// Whether a real solution may have been overlooked.
     pub(crate) doubtful: bool,
-    /// How many essential matrices are real.
+    /// How many real motions there are, as far as the method knows.
     real: usize,
     shortlist: Shortlist,
 }
@@ -107,35 +117,56 @@ const PRECISE: f64 = 1e-13;
 /// is as far off the line as they are apart. Newton's iteration decides.
 const NEARLY_REAL: f64 = 1e-2;
 
+fn is_nearly_real(value: Complex<f64>) -> bool {
+    value.im < NEARLY_REAL * (1.0 + value.re.abs())
+}
+
 impl Solutions<'_> {
     /// Adds the two motions of the essential matrix `x E1 + y E2 + z E3 + w E4`.
     pub(crate) fn push_real(&mut self, point: &[f64; 4]) {
-        let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
-        let start = Motion { q_21: unit(q), direction: Vector3::from(t).normalize() };
-        self.real += 1;
-        self.push_solution(start);
+        self.real += 2;
+        if let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) {
+            self.push_solution(Motion { q_21: unit(q), direction: Vector3::from(t).normalize() });
+        }
     }
 
-    /// Adds what stands behind a conjugate pair of values of an unknown, given the point of the one with the positive
-    /// imaginary part: the real parts of both rotations, each with the translation that fits it best; or two real solutions
-    /// that rounding has joined, where there is next to no imaginary part.
+    /// Adds a real motion and its twisted partner, of which a method has said how many to expect.
+    pub(crate) fn push_motion(&mut self, motion: Motion) {
+        self.push_solution(motion);
+    }
+
+    /// How many real motions there are.
+    pub(crate) fn expect_real(&mut self, count: usize) {
+        self.real = count;
+    }
+
+    /// Adds what stands behind a conjugate pair of values of an unknown: the real parts of both rotations of the essential
+    /// matrix at the point of the one with the positive imaginary part.
     pub(crate) fn push_conjugates(
         &mut self,
         value: Complex<f64>,
         point: impl FnOnce() -> Option<[Complex<f64>; 4]>,
     ) {
-        let nearly_real = value.im < NEARLY_REAL * (1.0 + value.re.abs());
-        if !nearly_real && self.kinds == Kinds::Exact {
-            return;
+        if self.is_wanted(value) {
+            let decomposed = point().and_then(|point| decompose(&rows(&combine(&self.basis, &point))));
+            let Some((q, t)) = decomposed else { return };
+            self.push_real_part(value, q);
+            self.push_real_part(value, twisted(&q, &t));
         }
-        let decomposed = point().and_then(|point| decompose(&rows(&combine(&self.basis, &point))));
-        let Some((q, t)) = decomposed else { return };
-        for q in [q, twisted(&q, &t)] {
-            let q_21 = unit(real_part(q));
-            let start = Motion { q_21, direction: translation_direction(&q_21, self.matches) };
-            if !(nearly_real && self.push_solution(start)) {
-                self.shortlist.push(CandidateKind::FromComplex, start);
-            }
+    }
+
+    /// Whether anything comes of a conjugate pair of values.
+    pub(crate) fn is_wanted(&self, value: Complex<f64>) -> bool {
+        self.kinds == Kinds::All || is_nearly_real(value)
+    }
+
+    /// Adds the real part of a complex quaternion, with the translation that fits it best; or two real solutions that rounding
+    /// has joined, where there is next to no imaginary part.
+    pub(crate) fn push_real_part(&mut self, value: Complex<f64>, q: [Complex<f64>; 4]) {
+        let q_21 = unit(real_part(q));
+        let start = Motion { q_21, direction: translation_direction(&q_21, self.matches) };
+        if !(is_nearly_real(value) && self.push_solution(start)) {
+            self.shortlist.push(CandidateKind::FromComplex, start);
         }
     }
 
@@ -155,16 +186,16 @@ impl Solutions<'_> {
         self.shortlist.count(CandidateKind::Exact) > before
     }
 
-    /// Whether each real essential matrix has led to two motions of its own.
+    /// Whether as many different motions were found as there are.
     fn is_complete(&self) -> bool {
-        !self.doubtful && self.shortlist.count(CandidateKind::Exact) >= 2 * self.real
+        !self.doubtful && self.shortlist.count(CandidateKind::Exact) >= self.real
     }
 
     /// Another basis of the same space. What is exact stays.
     fn mix(&mut self, mixing: &[[f64; 4]; 4]) {
         self.basis = mixing.map(|row| combine(&self.basis, &row));
         self.shortlist.retain(CandidateKind::Exact);
-        (self.doubtful, self.real) = (false, 0);
+        (self.attempt, self.doubtful, self.real) = (self.attempt + 1, false, 0);
     }
 }
 

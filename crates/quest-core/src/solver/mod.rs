@@ -4,15 +4,17 @@ mod aligned;
 mod consensus;
 mod cubics;
 pub mod eight_point;
-mod essential;
+pub(crate) mod essential;
+pub(crate) mod essentials;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
+pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
 mod moments;
-mod motion;
+pub(crate) mod motion;
 pub mod nister;
 mod normalisation;
 pub mod quest;
@@ -28,6 +30,7 @@ use std::str::FromStr;
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;
+pub use kneip::Kneip;
 pub use kukelova::Kukelova;
 pub use li_hartley::LiHartley;
 pub use nister::Nister;
@@ -78,6 +81,8 @@ pub enum SolverName {
     LiHartley,
     /// [`Kukelova`].
     Kukelova,
+    /// [`Kneip`].
+    Kneip,
     /// [`Homography`].
     Homography,
     /// [`EightPoint`].
@@ -107,7 +112,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Relinearization,
@@ -115,6 +120,7 @@ impl SolverName {
         Self::Stewenius,
         Self::LiHartley,
         Self::Kukelova,
+        Self::Kneip,
         Self::Homography,
         Self::EightPoint,
     ];
@@ -165,6 +171,12 @@ impl SolverName {
                 max_candidates: 20,
                 reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
             },
+            Self::Kneip => SolverInfo {
+                name: Kneip::NAME,
+                min_matches: Kneip::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Kneip, Siegwart, Pollefeys, ECCV 2012",
+            },
             Self::Homography => SolverInfo {
                 name: Homography::NAME,
                 min_matches: Homography::MIN_MATCHES,
@@ -190,6 +202,7 @@ impl SolverName {
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
             Self::LiHartley => LiHartley { kinds }.solve(matches, out),
             Self::Kukelova => Kukelova { kinds }.solve(matches, out),
+            Self::Kneip => Kneip { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
         }

@@ -13,7 +13,8 @@ forward).
 >>> camera.bearing([[514, 384]])
 array([[0., 0., 1.]])
 
-``solve`` finds candidate poses from five or more correct matches. All errors are a ``QuestError``.
+``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``solve`` the
+candidate poses of five or more correct matches. All errors are a ``QuestError``.
 """
 
 from typing import NamedTuple
@@ -23,13 +24,19 @@ from quest_pose._core import (
     Camera,
     Candidate,
     DegenerateInput,
+    Estimate,
+    EstimateBatch,
+    NoPose,
     NotFinite,
     QuestError,
+    RunnerUp,
     ShapeMismatch,
     TooFewMatches,
     __version__,
     _solvers,
     constraint_matrix,
+    estimate,
+    estimate_batch,
     solve,
 )
 
@@ -38,13 +45,19 @@ __all__ = [
     "Camera",
     "Candidate",
     "DegenerateInput",
+    "Estimate",
+    "EstimateBatch",
+    "NoPose",
     "NotFinite",
     "QuestError",
+    "RunnerUp",
     "ShapeMismatch",
     "SolverInfo",
     "TooFewMatches",
     "__version__",
     "constraint_matrix",
+    "estimate",
+    "estimate_batch",
     "solve",
     "solvers",
 ]

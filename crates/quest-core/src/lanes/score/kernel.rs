@@ -1,0 +1,131 @@
+//! The loops over all matches.
+
+use super::columns::{BLOCK, MatchColumns, Real};
+use super::{Loss, Score, Stop};
+use crate::lanes::lane::{F, Float, Lanes, MAX_LANES};
+
+/// Work that can be done with any lanes of `T`.
+pub trait Kernel<T> {
+    /// What comes out.
+    type Output;
+
+    /// Does it.
+    fn run<L: Lanes<T>>(self, lanes: L) -> Self::Output;
+}
+
+/// The score of one matrix.
+pub(super) struct Sum<'a, T, C> {
+    pub(super) matches: &'a C,
+    pub(super) e: [T; 9],
+    pub(super) threshold: f64,
+    pub(super) loss: Loss,
+    pub(super) stop: Stop,
+}
+
+impl<T: Real, C: MatchColumns<T>> Kernel<T> for Sum<'_, T, C> {
+    type Output = Score;
+
+    #[inline(always)]
+    fn run<L: Lanes<T>>(self, lanes: L) -> Score {
+        match self.loss {
+            Loss::Truncated => self.sum(lanes, truncated),
+            Loss::Marginalised => self.sum(lanes, marginalised),
+        }
+    }
+}
+
+impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
+    #[inline(always)]
+    fn sum<L: Lanes<T>>(&self, lanes: L, count: impl Fn(F<L, T>, F<L, T>) -> F<L, T>) -> Score {
+        let zero = lanes.splat(T::from_f64(0.0));
+        let square = self.threshold * self.threshold;
+        let limit = lanes.splat(T::from_f64(square));
+        let e = splat::<T, L>(lanes, &self.e);
+        let all = self.matches.len();
+        let mut score = Score { sum: 0.0, visited: 0 };
+        while score.visited < all {
+            let block = self.matches.block(score.visited / BLOCK);
+            let mut sum = zero;
+            for k in 0..BLOCK / L::COUNT {
+                let (error, gradient) = C::constraint(lanes, &e, block, k * L::COUNT);
+                let error = error / gradient;
+                // False for the NaN that fill the last block.
+                sum = sum + count(limit, error).select(error.less(limit), zero);
+            }
+            score.sum += total::<T, L>(sum) / square;
+            score.visited = all.min(score.visited + BLOCK);
+            if self.stop.is_reached(score.sum, score.visited, all) {
+                break;
+            }
+        }
+        score
+    }
+}
+
+/// `T² (1 − u²)`, by `T²` and the squared error `T² u²`.
+#[inline(always)]
+fn truncated<T: Real, V: Float<T>>(limit: V, error: V) -> V {
+    limit - error
+}
+
+/// `T² (1 − u)² = T² + r² − 2 T r`.
+#[inline(always)]
+fn marginalised<T: Real, V: Float<T>>(limit: V, error: V) -> V {
+    let root = (limit * error).sqrt();
+    limit + error - (root + root)
+}
+
+/// The inliers of one matrix.
+pub(super) struct Inliers<'a, T, C> {
+    pub(super) matches: &'a C,
+    pub(super) e: [T; 9],
+    pub(super) threshold: f64,
+    pub(super) mask: &'a mut [u64],
+}
+
+impl<T: Real, C: MatchColumns<T>> Kernel<T> for Inliers<'_, T, C> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<L: Lanes<T>>(self, lanes: L) -> usize {
+        let (zero, one) = (lanes.splat(T::from_f64(0.0)), lanes.splat(T::from_f64(1.0)));
+        let square = lanes.splat(T::from_f64(self.threshold * self.threshold));
+        let e = splat::<T, L>(lanes, &self.e);
+        let mut count = 0;
+        for (block, word) in self.mask.iter_mut().enumerate() {
+            let block = self.matches.block(block);
+            for k in (0..BLOCK).step_by(L::COUNT) {
+                let (error, gradient) = C::constraint(lanes, &e, block, k);
+                let is_inlier = error.less(gradient * square);
+                let mut flags = [T::from_f64(0.0); MAX_LANES];
+                one.select(is_inlier, zero).store(&mut flags);
+                for (lane, flag) in flags[..L::COUNT].iter().enumerate() {
+                    *word |= u64::from((*flag).into() > 0.5) << (k + lane);
+                }
+            }
+            count += word.count_ones() as usize;
+        }
+        count
+    }
+}
+
+#[inline(always)]
+fn splat<T: Real, L: Lanes<T>>(lanes: L, e: &[T; 9]) -> [F<L, T>; 9] {
+    let mut out = [lanes.splat(e[0]); 9];
+    for i in 1..9 {
+        out[i] = lanes.splat(e[i]);
+    }
+    out
+}
+
+/// The sum over the lanes.
+#[inline(always)]
+fn total<T: Real, L: Lanes<T>>(sum: F<L, T>) -> f64 {
+    let mut parts = [T::from_f64(0.0); MAX_LANES];
+    sum.store(&mut parts);
+    let mut total = 0.0;
+    for part in &parts[..L::COUNT] {
+        total += (*part).into();
+    }
+    total
+}
