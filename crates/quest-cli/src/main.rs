@@ -14,6 +14,7 @@ mod simulate;
 mod solve;
 mod solvers;
 mod table;
+mod view;
 mod words;
 mod writer;
 
@@ -46,6 +47,7 @@ enum Command {
     Estimate(Box<estimate::Arguments>),
     Simulate(Box<simulate::Arguments>),
     Servo(Box<servo::Arguments>),
+    View(view::Arguments),
     Solvers(solvers::Arguments),
 }
 
@@ -77,6 +79,7 @@ fn main() -> ExitCode {
         Command::Estimate(arguments) => estimate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Servo(arguments) => servo::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

@@ -9,6 +9,7 @@ mod output;
 mod readme;
 mod servo;
 mod simulate;
+mod view;
 
 use std::{
     fs,
