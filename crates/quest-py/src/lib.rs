@@ -6,6 +6,7 @@ mod camera;
 mod candidate;
 mod errors;
 mod solve;
+mod solve_batch;
 
 use pyo3::pymodule;
 
@@ -22,6 +23,9 @@ mod _core {
     use crate::errors::{BadCamera, DegenerateInput, NotFinite, QuestError, ShapeMismatch, TooFewMatches};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
+
+    #[pymodule_export]
+    use crate::solve_batch::_solve_batch;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

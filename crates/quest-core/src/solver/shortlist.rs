@@ -171,7 +171,7 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
-fn rank(out: &mut Candidates) {
+pub(crate) fn rank(out: &mut Candidates) {
     let key = |c: &Candidate| (c.residual.max(ROUNDING), -c.pose.wxyz()[0]);
     out.as_mut_slice().sort_unstable_by(|x, y| {
         let ((r, w), (s, v)) = (key(x), key(y));

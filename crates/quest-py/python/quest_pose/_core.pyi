@@ -15,6 +15,7 @@ __all__ = [
     "TooFewMatches",
     "__version__",
     "_candidate",
+    "_solve_batch",
     "_solvers",
     "constraint_matrix",
     "solve",
@@ -104,5 +105,8 @@ def solve(
     kinds: Literal["all", "exact"] = "all",
 ) -> list[Candidate]: ...
 def constraint_matrix(x1: ArrayLike, x2: ArrayLike) -> _Array: ...
+def _solve_batch(
+    x1: ArrayLike, x2: ArrayLike
+) -> tuple[NDArray[np.int64], _Array, _Array, NDArray[np.int64], _Array]: ...
 def _candidate(state: tuple[Any, ...]) -> Candidate: ...
 def _solvers() -> list[tuple[str, int, int, str]]: ...
