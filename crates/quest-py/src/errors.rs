@@ -3,6 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
+use quest_core::robust::EstimateError;
 use quest_core::{CameraError, Degeneracy, InputError, MatchError};
 
 create_exception!(
@@ -24,6 +25,12 @@ create_exception!(
     DegenerateInput,
     QuestError,
     "The points determine no pose, or have no direction."
+);
+create_exception!(
+    quest_pose,
+    NoPose,
+    QuestError,
+    "No pose agrees with more of the matches than chance explains."
 );
 create_exception!(
     quest_pose,
@@ -55,6 +62,15 @@ fn of_input(error: &InputError, message: String) -> PyErr {
         InputError::Degenerate { .. } => DegenerateInput::new_err(message),
         InputError::TooManyMatches { .. } => PyMemoryError::new_err(message),
         _ => QuestError::new_err(message),
+    }
+}
+
+/// The exception for an estimate that failed.
+pub(crate) fn estimate(error: &EstimateError) -> PyErr {
+    match error {
+        EstimateError::Input(error) => input(error),
+        EstimateError::NoPose { .. } => NoPose::new_err(error.to_string()),
+        _ => QuestError::new_err(error.to_string()),
     }
 }
 

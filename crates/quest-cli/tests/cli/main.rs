@@ -3,9 +3,11 @@
 
 mod bad_input;
 mod candidates;
+mod estimate;
 mod formats;
 mod output;
 mod readme;
+mod servo;
 mod simulate;
 
 use std::{

@@ -86,7 +86,7 @@ fn homography(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
 const RANK_ONE: f64 = 1e-7;
 
 /// One motion of each of the two essential matrices of a plane; none for a rotation alone.
-fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
+pub(crate) fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
     let svd = h.svd(false, true);
     let Some(v_t) = svd.v_t else { return [None; 2] };
     let middle = svd.singular_values[1];

@@ -5,6 +5,7 @@ mod consensus;
 mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
+pub(crate) mod essentials;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
@@ -13,7 +14,7 @@ pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
 mod moments;
-mod motion;
+pub(crate) mod motion;
 pub mod nister;
 mod normalisation;
 pub mod quest;
@@ -111,7 +112,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Relinearization,

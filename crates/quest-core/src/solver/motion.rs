@@ -69,7 +69,7 @@ impl Motion {
         })
     }
 
-    fn moved(&self, tangent: &[Vector3<f64>; 2], step: &[f64; 5]) -> Self {
+    pub(crate) fn moved(&self, tangent: &[Vector3<f64>; 2], step: &[f64; 5]) -> Self {
         // To first order a rotation by ω; any step of the iteration may differ from it to second order.
         let turn = Quaternion::new(1.0, 0.5 * step[0], 0.5 * step[1], 0.5 * step[2]);
         let direction = self.direction + tangent[0] * step[3] + tangent[1] * step[4];
@@ -233,7 +233,11 @@ pub(crate) fn tangent_basis(t: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// The step `−(H + damping · diag H)⁻¹ g`, where it exists.
-fn damped_step(hessian: &Matrix5<f64>, gradient: &Vector5<f64>, damping: f64) -> Option<Vector5<f64>> {
+pub(crate) fn damped_step(
+    hessian: &Matrix5<f64>,
+    gradient: &Vector5<f64>,
+    damping: f64,
+) -> Option<Vector5<f64>> {
     let mut damped = *hessian;
     for k in 0..5 {
         damped[(k, k)] *= 1.0 + damping;

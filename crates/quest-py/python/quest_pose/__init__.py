@@ -13,7 +13,9 @@ forward).
 >>> camera.bearing([[514, 384]])
 array([[0., 0., 1.]])
 
-``solve`` finds candidate poses from five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a ``QuestError``.
+``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``solve`` the
+candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a
+``QuestError``.
 """
 
 from typing import NamedTuple
@@ -26,14 +28,20 @@ from quest_pose._core import (
     Camera,
     Candidate,
     DegenerateInput,
+    Estimate,
+    EstimateBatch,
+    NoPose,
     NotFinite,
     QuestError,
+    RunnerUp,
     ShapeMismatch,
     TooFewMatches,
     __version__,
     _solve_batch,
     _solvers,
     constraint_matrix,
+    estimate,
+    estimate_batch,
     solve,
 )
 
@@ -42,14 +50,20 @@ __all__ = [
     "Camera",
     "Candidate",
     "DegenerateInput",
+    "Estimate",
+    "EstimateBatch",
+    "NoPose",
     "NotFinite",
     "QuestError",
+    "RunnerUp",
     "ShapeMismatch",
     "SolvedBatch",
     "SolverInfo",
     "TooFewMatches",
     "__version__",
     "constraint_matrix",
+    "estimate",
+    "estimate_batch",
     "solve",
     "solve_batch",
     "solvers",
