@@ -41,7 +41,15 @@ create_exception!(
 
 /// The exception for a set of matches that the core refuses.
 pub(crate) fn input(error: &InputError) -> PyErr {
-    let message = error.to_string();
+    of_input(error, error.to_string())
+}
+
+/// The exception for a set of matches that the core refuses, one of many sets.
+pub(crate) fn sample(index: usize, error: &InputError) -> PyErr {
+    of_input(error, format!("sample {index}, {error}"))
+}
+
+fn of_input(error: &InputError, message: String) -> PyErr {
     match error {
         InputError::Match { source, .. } => match source {
             MatchError::NotFinite { .. } => NotFinite::new_err(message),

@@ -9,6 +9,7 @@ mod estimate;
 mod estimate_batch;
 mod servo;
 mod solve;
+mod solve_batch;
 
 use pyo3::pymodule;
 
@@ -33,6 +34,9 @@ mod _core {
     use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
+
+    #[pymodule_export]
+    use crate::solve_batch::_solve_batch;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -22,7 +22,7 @@ pub mod quest;
 pub mod quest_eigen;
 mod refining;
 pub mod relinearization;
-mod shortlist;
+pub(crate) mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
 mod twenty;

@@ -227,7 +227,7 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
-fn rank(out: &mut Candidates) {
+pub(crate) fn rank(out: &mut Candidates) {
     // Positive numbers are ordered as their bits are: keys are compared as integers, and candidates moved once.
     let key = |(k, c): (usize, &Candidate)| {
         let residual = c.residual.max(ROUNDING).to_bits();
