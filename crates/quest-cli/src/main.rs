@@ -9,6 +9,7 @@ mod input;
 mod options;
 mod progress;
 mod rows;
+mod simulate;
 mod solve;
 mod solvers;
 mod table;
@@ -24,6 +25,7 @@ Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
   quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli solve --format json pair.json | jq     the same for programs
+  quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -40,6 +42,7 @@ struct Arguments {
 enum Command {
     Solve(Box<solve::Arguments>),
     Estimate(Box<estimate::Arguments>),
+    Simulate(Box<simulate::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -56,6 +59,11 @@ enum Failure {
     Read(#[from] quest_io::ReadError),
     #[error(transparent)]
     Write(#[from] quest_io::WriteError),
+    #[error(transparent)]
+    Scene(#[from] quest_core::simulate::SceneError),
+    #[error(transparent)]
+    Plot(#[from] quest_plot::PlotError),
+    /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
 }
@@ -64,6 +72,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
         Command::Estimate(arguments) => estimate::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

@@ -7,6 +7,7 @@ mod estimate;
 mod formats;
 mod output;
 mod readme;
+mod simulate;
 
 use std::{
     fs,

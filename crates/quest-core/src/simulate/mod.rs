@@ -12,11 +12,13 @@
 //! ```
 
 mod camera;
+mod experiment;
 mod metrics;
 mod options;
 mod outliers;
 mod sampling;
 mod scene;
+mod selection;
 
 #[cfg(test)]
 mod tests;
@@ -24,6 +26,8 @@ mod tests;
 pub use camera::{
     FOCAL_LENGTH, IMAGE_SIZE, PRINCIPAL_POINT, is_inside_image, pixel_to_plane, plane_to_pixel,
 };
+pub use experiment::{Cell, FURTHER_POINTS, Figure, Problem, Reading};
 pub use metrics::{rotation_metric, translation_metric};
 pub use options::{Angle, Layout, Motion, SceneError, SceneOptions, View};
 pub use scene::Scene;
+pub use selection::{PoseErrors, choose};

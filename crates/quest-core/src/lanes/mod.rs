@@ -1,0 +1,53 @@
+//! Many minimal problems at once, one in each lane of a vector register.
+//!
+//! A robust estimator needs the essential matrices of thousands of samples of five matches, and the score of each over all
+//! matches. Both are the same arithmetic on independent data, which vector instructions do for two, four or eight
+//! of them at once:
+//!
+//! - [`BatchSolver`]: samples of five matches in, [`Essentials`] out, in structure of arrays.
+//! - [`Scorer`]: an essential matrix and all matches in ([`ImageMatches`], [`BearingMatches`]), a [`Score`] or a mask of
+//!   inliers out.
+//!
+//! [`Instructions`] says which vector instructions are used; the best that the processor has are found at run time.
+//!
+//! ```
+//! use quest_core::lanes::{BatchSolver, Essentials, Tolerance};
+//! # let x1 = [[0.1, 0.2], [-0.3, 0.1], [0.2, -0.2], [-0.1, -0.3], [0.3, 0.3], [0.2, 0.1]];
+//! # let x2 = [[0.16, 0.2], [-0.22, 0.1], [0.25, -0.19], [-0.06, -0.28], [0.35, 0.31], [0.26, 0.11]];
+//! # let matches = quest_core::correspondence::from_image_points(&x1, &x2)?;
+//!
+//! let samples = [[0, 1, 2, 3, 4], [1, 2, 3, 4, 5]];
+//! let mut solver = BatchSolver::new(Tolerance::Tight);
+//! let mut found = Essentials::new();
+//! solver.solve(&matches, &samples, &mut found)?;
+//! for sample in 0..found.samples() {
+//!     for k in found.of(sample) {
+//!         println!("{sample}: {:?}", found.matrices()[k]);
+//!     }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod batch;
+mod cubics;
+mod elimination;
+mod essentials;
+mod frame;
+mod geometry;
+mod instructions;
+mod lane;
+mod motion;
+mod null_space;
+mod portable;
+mod resultant;
+mod roots;
+mod score;
+#[cfg(test)]
+mod test;
+#[cfg(target_arch = "x86_64")]
+mod vector;
+
+pub use batch::{BatchSolver, SampleError, Tolerance};
+pub use essentials::Essentials;
+pub use instructions::Instructions;
+pub use score::{BearingMatches, ImageMatches, Loss, MatchColumns, Real, Score, Scorer, Stop};

@@ -1,0 +1,169 @@
+//! Lanes in arrays, for the compiler to put into whatever registers there are.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::lane::{Float, Lanes, Mask, WordLanes};
+
+/// Whether a product and a sum are one instruction of the target; where they are not, `mul_add` is a slow function.
+const FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
+
+/// `N` lanes in an array.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Portable<const N: usize>;
+
+/// `N` numbers.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
+pub(super) struct Array<T, const N: usize>([T; N]);
+
+macro_rules! lanes {
+    ($real:ty) => {
+        impl<const N: usize> Lanes<$real> for Portable<N> {
+            const COUNT: usize = N;
+            type Float = Array<$real, N>;
+
+            #[inline(always)]
+            fn splat(self, x: $real) -> Array<$real, N> {
+                Array([x; N])
+            }
+
+            #[inline(always)]
+            fn load(self, x: &[$real]) -> Array<$real, N> {
+                Array(*x.first_chunk().expect("as many numbers as lanes"))
+            }
+        }
+
+        lanes!(@binary $real, Add add +, Sub sub -, Mul mul *, Div div /);
+
+        impl<const N: usize> Neg for Array<$real, N> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn neg(mut self) -> Self {
+                for x in &mut self.0 {
+                    *x = -*x;
+                }
+                self
+            }
+        }
+
+        impl<const N: usize> Float<$real> for Array<$real, N> {
+            type Mask = [bool; N];
+
+            #[inline(always)]
+            fn mul_add(self, b: Self, mut c: Self) -> Self {
+                for i in 0..N {
+                    c.0[i] = if FUSED { self.0[i].mul_add(b.0[i], c.0[i]) } else { self.0[i] * b.0[i] + c.0[i] };
+                }
+                c
+            }
+
+            #[inline(always)]
+            fn neg_mul_add(self, b: Self, mut c: Self) -> Self {
+                for i in 0..N {
+                    c.0[i] = if FUSED { (-self.0[i]).mul_add(b.0[i], c.0[i]) } else { c.0[i] - self.0[i] * b.0[i] };
+                }
+                c
+            }
+
+            #[inline(always)]
+            fn sqrt(mut self) -> Self {
+                for x in &mut self.0 {
+                    *x = x.sqrt();
+                }
+                self
+            }
+
+            #[inline(always)]
+            fn abs(mut self) -> Self {
+                for x in &mut self.0 {
+                    *x = x.abs();
+                }
+                self
+            }
+
+            #[inline(always)]
+            fn less(self, other: Self) -> [bool; N] {
+                let mut mask = [false; N];
+                for i in 0..N {
+                    mask[i] = self.0[i] < other.0[i];
+                }
+                mask
+            }
+
+            #[inline(always)]
+            fn select(mut self, mask: [bool; N], other: Self) -> Self {
+                for i in 0..N {
+                    self.0[i] = if mask[i] { self.0[i] } else { other.0[i] };
+                }
+                self
+            }
+
+            #[inline(always)]
+            fn store(self, out: &mut [$real]) {
+                out[..N].copy_from_slice(&self.0);
+            }
+        }
+    };
+    (@binary $real:ty, $($Op:ident $op:ident $symbol:tt),*) => {$(
+        impl<const N: usize> $Op for Array<$real, N> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $op(mut self, other: Self) -> Self {
+                for i in 0..N {
+                    self.0[i] = self.0[i] $symbol other.0[i];
+                }
+                self
+            }
+        }
+    )*};
+}
+
+lanes!(f32);
+lanes!(f64);
+
+impl<const N: usize> Mask for [bool; N] {
+    #[inline(always)]
+    fn and(mut self, other: Self) -> Self {
+        for i in 0..N {
+            self[i] &= other[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn or(mut self, other: Self) -> Self {
+        for i in 0..N {
+            self[i] |= other[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.contains(&true)
+    }
+}
+
+impl<const N: usize> WordLanes for Portable<N> {
+    type Words = [u64; N];
+
+    #[inline(always)]
+    fn no_bits(self) -> [u64; N] {
+        [0; N]
+    }
+
+    #[inline(always)]
+    fn with_bit(self, mut words: [u64; N], mask: [bool; N], bit: u64) -> [u64; N] {
+        for i in 0..N {
+            words[i] |= if mask[i] { bit } else { 0 };
+        }
+        words
+    }
+
+    #[inline(always)]
+    fn store_words(self, words: [u64; N], out: &mut [u64]) {
+        out[..N].copy_from_slice(&words);
+    }
+}

@@ -1,0 +1,213 @@
+//! The laws of the lanes, and what their tests share.
+
+use super::batch::BatchSolver;
+use super::{Essentials, Instructions, Tolerance};
+use crate::simulate::{Motion, Scene, SceneOptions};
+use crate::solver::{Kinds, PoseSolver, Quest};
+use crate::{Candidates, Correspondence};
+
+/// The instructions of this processor.
+pub(super) fn available() -> impl Iterator<Item = Instructions> {
+    Instructions::ALL.into_iter().filter(|i| i.is_available())
+}
+
+/// A realistic scene.
+pub(super) fn scene(points: usize, noise_px: f64, index: u64) -> Scene {
+    const SEED: u64 = 606;
+    let options = SceneOptions { points, noise_px, ..SceneOptions::realistic() };
+    Scene::generate(&options, SEED, index).unwrap()
+}
+
+/// Matches of as many scenes, and the sample of each.
+fn samples(scenes: impl Iterator<Item = Scene>) -> (Vec<Correspondence>, Vec<[u32; 5]>) {
+    let matches: Vec<_> = scenes.flat_map(|s| s.matches).collect();
+    let sample = |i: u32| std::array::from_fn(|k| 5 * i + u32::try_from(k).unwrap());
+    let samples = (0..u32::try_from(matches.len() / 5).unwrap()).map(sample).collect();
+    (matches, samples)
+}
+
+fn distance(x: &[f64; 9], y: &[f64; 9]) -> f64 {
+    let norm = |sign: f64| x.iter().zip(y).map(|(x, y)| (x - sign * y).powi(2)).sum::<f64>().sqrt();
+    norm(1.0).min(norm(-1.0))
+}
+
+/// The largest distance from a matrix of one list to the nearest of the other.
+fn hausdorff(x: &[[f64; 9]], y: &[[f64; 9]]) -> f64 {
+    let from = |x: &[[f64; 9]], y: &[[f64; 9]]| {
+        let nearest = |a: &[f64; 9]| y.iter().map(|b| distance(a, b)).fold(f64::INFINITY, f64::min);
+        x.iter().map(nearest).fold(0.0, f64::max)
+    };
+    from(x, y).max(from(y, x))
+}
+
+fn scalar(five: &[Correspondence]) -> Vec<[f64; 9]> {
+    let mut candidates = Candidates::new();
+    Quest { kinds: Kinds::Exact }.solve(five, &mut candidates);
+    let essential = |pose: crate::RelativePose| pose.essential().transpose() / pose.t_21.norm();
+    candidates.iter().map(|c| essential(c.pose).as_slice().try_into().unwrap()).collect()
+}
+
+/// How many of the samples are flagged; panics where another one differs from the scalar solver by more than `tolerance`.
+fn compare(
+    instructions: Instructions,
+    matches: &[Correspondence],
+    samples: &[[u32; 5]],
+    tolerance: f64,
+) -> usize {
+    let solver = BatchSolver::with_instructions(Tolerance::Tight, instructions).unwrap();
+    let mut found = Essentials::new();
+    solver.solve(matches, samples, &mut found).unwrap();
+    assert_eq!(found.samples(), samples.len());
+    let mut flagged = 0;
+    for sample in 0..samples.len() {
+        if !found.is_complete(sample) {
+            flagged += 1;
+            continue;
+        }
+        let expected = scalar(&matches[5 * sample..5 * sample + 5]);
+        let error = hausdorff(&found.matrices()[found.of(sample)], &expected);
+        assert!(error < tolerance, "{instructions:?}, scene {sample}: {error:e}");
+    }
+    flagged
+}
+
+#[test]
+fn lanes_are_the_scalar_solver() {
+    let (matches, samples) = samples((0..1000).map(|index| scene(5, 0.75, index)));
+    for instructions in available() {
+        assert!(compare(instructions, &matches, &samples, 1e-9) < 20);
+    }
+}
+
+#[test]
+#[ignore = "a minute: 100,000 scenes"]
+fn lanes_are_the_scalar_solver_a_hundred_thousand_times() {
+    for batch in 0..100 {
+        let (matches, samples) = samples((0..1000).map(|index| scene(5, 0.75, 1000 * batch + index)));
+        for instructions in available() {
+            compare(instructions, &matches, &samples, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn little_parallax_is_no_difficulty() {
+    // The direction of the translation is known to the rounding of the bearings over the parallax.
+    for (parallax, tolerance) in [(1e-2, 1e-8), (1e-4, 1e-6)] {
+        let options = SceneOptions { motion: Motion::Parallax(parallax), ..SceneOptions::realistic() };
+        let scenes = (0..300).map(|index| Scene::generate(&options, 607, index).unwrap());
+        let (matches, samples) = samples(scenes);
+        for instructions in available() {
+            assert!(compare(instructions, &matches, &samples, tolerance) < 10);
+        }
+    }
+}
+
+#[test]
+fn nothing_depends_on_the_lane_or_the_neighbours_or_the_batch() {
+    let (mut matches, mut samples) = samples((0..60).map(|index| scene(5, 0.75, index)));
+    // Every third sample is degenerate: one match five times, or a pure rotation, whose lanes hold no numbers.
+    for (k, sample) in samples.iter_mut().enumerate().filter(|(k, _)| k % 3 == 0) {
+        let first = 5 * k;
+        if k % 2 == 0 {
+            *sample = [sample[0]; 5];
+        } else {
+            for m in &mut matches[first..first + 5] {
+                *m = Correspondence::from_bearings((*m.bearing1()).into(), (*m.bearing1()).into()).unwrap();
+            }
+        }
+    }
+    for instructions in available() {
+        for tolerance in [Tolerance::Tight, Tolerance::Loop] {
+            let solver = BatchSolver::with_instructions(tolerance, instructions).unwrap();
+            let (mut together, mut apart) = (Essentials::new(), Essentials::new());
+            solver.solve(&matches, &samples, &mut together).unwrap();
+            for size in [1, 2, 3, 7, 8, 13] {
+                for (chunk, some) in samples.chunks(size).enumerate() {
+                    solver.solve(&matches, some, &mut apart).unwrap();
+                    for k in 0..some.len() {
+                        let sample = chunk * size + k;
+                        // To the last bit.
+                        let (x, y) =
+                            (&together.matrices()[together.of(sample)], &apart.matrices()[apart.of(k)]);
+                        assert_eq!(
+                            x, y,
+                            "{instructions:?} {tolerance:?}, sample {sample} in a batch of {size}"
+                        );
+                        assert_eq!(together.is_complete(sample), apart.is_complete(k));
+                        assert!(sample % 3 != 0 || !apart.is_complete(k), "sample {sample} is degenerate");
+                        assert!(x.as_flattened().iter().all(|e| e.is_finite()));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_flagged_is_solved_again() {
+    let (matches, mut samples) = samples((0..100).map(|index| scene(5, 0.0, index)));
+    samples[17] = [3; 5];
+    for instructions in available() {
+        for tolerance in [Tolerance::Tight, Tolerance::Loop] {
+            let solver = BatchSolver::with_instructions(tolerance, instructions).unwrap();
+            let mut found = Essentials::new();
+            solver.solve_all(&matches, &samples, &mut found).unwrap();
+            assert!((0..100).all(|sample| found.is_complete(sample)));
+            assert!(found.of(17).is_empty() && found.of(100).is_empty());
+            for sample in (0..100).filter(|&sample| sample != 17) {
+                let truth = scene(5, 0.0, sample).truth;
+                let is_right = |k| {
+                    let (rotations, t) = found.motions(k).unwrap();
+                    let near = |q: &nalgebra::UnitQuaternion<f64>| q.angle_to(&truth.q_21) < 1e-6;
+                    rotations.iter().any(near) && t.cross(&truth.t_21.normalize()).norm() < 1e-6
+                };
+                assert!(
+                    found.of(usize::try_from(sample).unwrap()).any(is_right),
+                    "{instructions:?} {sample}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn for_a_robust_loop_the_sample_fits_exactly() {
+    let (matches, samples) = samples((0..200).map(|index| scene(5, 0.75, index)));
+    for instructions in available() {
+        let solver = BatchSolver::with_instructions(Tolerance::Loop, instructions).unwrap();
+        let mut found = Essentials::new();
+        solver.solve(&matches, &samples, &mut found).unwrap();
+        let mut uneven = 0;
+        for sample in 0..samples.len() {
+            for k in found.of(sample) {
+                let e = nalgebra::Matrix3::from_row_slice(&found.matrices()[k]);
+                for m in &matches[5 * sample..5 * sample + 5] {
+                    assert!(m.bearing2().dot(&(e * m.bearing1())).abs() < 1e-12);
+                }
+                // 2 E Eᵀ E − tr(E Eᵀ) E vanishes for the singular values (1, 1, 0).
+                let cubic = e * e.transpose() * e * 2.0 - e * (e * e.transpose()).trace();
+                uneven += usize::from(cubic.norm() > 1e-5);
+            }
+        }
+        assert!(100 * uneven < found.len(), "{uneven} of {}", found.len());
+    }
+}
+
+#[test]
+fn a_sample_of_a_match_that_is_not_there_is_an_error() {
+    let (matches, mut samples) = samples((0..20).map(|index| scene(5, 0.0, index)));
+    samples[11][2] = 100;
+    for instructions in available() {
+        let solver = BatchSolver::with_instructions(Tolerance::Tight, instructions).unwrap();
+        let mut found = Essentials::new();
+        let error = solver.solve(&matches, &samples, &mut found).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "sample 11 names match 100, expected an index below the number of matches, 100"
+        );
+        assert_eq!((found.samples(), found.len()), (0, 0));
+        solver.solve(&matches, &[], &mut found).unwrap();
+        assert!(found.is_empty());
+    }
+}
