@@ -5,7 +5,6 @@ mod consensus;
 mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
-pub(crate) mod essentials;
 mod five_point;
 mod hidden_variable;
 pub mod homography;
@@ -112,7 +111,7 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Quest,
         Self::QuestEigen,
         Self::Relinearization,
