@@ -19,10 +19,14 @@ pub(super) const REACH: f64 = 2.5;
 /// The mean score of a match that a hypothesis has to be likely to reach, where none is known yet.
 const LEAST_MEAN: f64 = 0.03;
 
-/// The loss of a residual in units of the reach.
-pub(super) fn loss(u: f64) -> f64 {
+/// With fewer matches the loss is the truncated square: of eight matches five are fitted by any motion, and what is left must
+/// not be rewarded for being small.
+pub(super) const MANY: usize = 10;
+
+/// The loss of a residual in units of the reach, for one of `count` matches.
+pub(super) fn loss(u: f64, count: usize) -> f64 {
     let u = u.abs().min(1.0);
-    u * (2.0 - u)
+    if count < MANY { u * u } else { u * (2.0 - u) }
 }
 
 /// The matches as the kernels take them.

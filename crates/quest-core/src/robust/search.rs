@@ -13,7 +13,7 @@ use super::options::KnownDirection;
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
 use super::sampling::{MAX_SAMPLE, Sampler};
-use super::score::{REACH, Scorer};
+use super::score::{MANY, REACH, Scorer};
 use super::stopping;
 use crate::lanes::{BatchSolver, Essentials, Tolerance};
 use crate::solver::SolverName;
@@ -33,9 +33,6 @@ const MATCHES: usize = 200;
 
 /// Where the loss of the local optimisation levels off, in units of the threshold.
 const WIDTH: f64 = 4.0;
-
-/// With fewer matches every hypothesis is refined and kept.
-pub(super) const MANY: usize = 10;
 
 /// Costs closer than this are equal: five matches are fitted exactly by every solution. The smaller rotation then comes
 /// first, as among candidates.
@@ -194,7 +191,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Of few matches every hypothesis is refined: the scores hardly tell them apart.
+    /// Of few matches every hypothesis is refined and kept: the scores hardly tell them apart.
     fn consider_one_of_few(&mut self, e: &Matrix3<f64>) {
         let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
         let optimised = self.optimise(scored);
