@@ -25,6 +25,9 @@ const EFFICIENCY: f64 = 1.10;
 /// Steps of the numerical derivatives of the length, in radians.
 const STEP: f64 = 1e-5;
 
+/// Matches that the derivatives of the length are taken over.
+const ENOUGH: usize = 200;
+
 /// The covariance of the five parameters of a motion, `sigma` the noise in pixels.
 fn of_motion(
     observations: &Observations,
@@ -49,11 +52,13 @@ pub(super) fn of_pose(
 ) -> Option<Matrix6<f64>> {
     let five = of_motion(observations, motion, inliers, sigma)?;
     let tangent = tangent_basis(&motion.direction);
+    // The derivatives of the length hardly need all of the matches.
+    let some = &inliers[..inliers.len().min(ENOUGH)];
     let slope = Vector5::from_fn(|k, _| {
         let at = |step: f64| {
             let mut steps = [0.0; 5];
             steps[k] = step;
-            length(observations, &motion.stepped(&tangent, &steps), inliers, sigma).value
+            length(observations, &motion.stepped(&tangent, &steps), some, sigma).value
         };
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     });
@@ -83,7 +88,8 @@ pub(super) fn of_rotation(
     sigma: f64,
     size: Length,
 ) -> Option<Matrix6<f64>> {
-    let rotation = rotation_hessian(observations, inliers, q_21).cholesky()?.inverse() * (sigma * sigma);
+    let rotation =
+        rotation_hessian(&observations.framed(inliers), q_21).cholesky()?.inverse() * (sigma * sigma);
     let mut covariance = Matrix6::zeros();
     covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
     let any = Matrix3::identity() * (size.value * size.value + size.variance);

@@ -61,7 +61,7 @@ pub(super) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
 
 /// The inverse depths of a match in view 1 and in view 2.
 fn both_views(observations: &Observations, motion: &Motion, index: usize) -> [InverseDepth; 2] {
-    let [(x1, _), (x2, _)] = observations.framed(index);
+    let [x1, x2] = observations.vectors(index);
     let one = inverse_depth(observations, motion, index);
     let turned = motion.q_21 * x1;
     // z1 R x1 + t = z2 x2 crossed with R x1: the same with the views exchanged.

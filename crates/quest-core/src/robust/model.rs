@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, UnitQuaternion};
 
 use super::estimate::{Evidence, Model};
 use super::loss::GemanMcClure;
-use super::observations::Observations;
+use super::observations::{FramedMatch, Observations};
 use super::plane::{CAP, Plane};
 use super::polish::SCALE;
 use super::pose_score::PoseScorer;
@@ -38,6 +38,9 @@ const LEAST_NOISE: f64 = 0.3;
 
 /// More matches than this are not looked at.
 const ENOUGH: usize = 300;
+
+/// Matches over which the two starts of the rotation are compared.
+const FITTED: usize = 60;
 
 /// Steps of the rotation's refinement.
 const STEPS: usize = 8;
@@ -63,12 +66,11 @@ pub(super) fn choose(
     let observations = poses.observations;
     let inliers = &poses.inliers[..poses.inliers.len().min(ENOUGH)];
     let sigma = sigma.max(LEAST_NOISE * poses.threshold);
-    let q_21 = rotation_alone(observations, inliers, q_21, sigma);
+    let framed = observations.framed(inliers);
+    let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();
     let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals[i as usize].powi(2)).collect();
-    let transfer = |h: &Matrix3<f64>| -> Vec<f64> {
-        inliers.iter().map(|&i| square_error(observations, h, i as usize)).collect()
-    };
+    let transfer = |h: &Matrix3<f64>| -> Vec<f64> { framed.iter().map(|m| square_error(h, m)).collect() };
     let (rotation, planar) = (transfer(&r_21), plane.map(|plane| transfer(&plane.homography)));
     let excess = |model: &[f64]| {
         let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
@@ -96,17 +98,19 @@ pub(super) fn choose(
 fn rotation_alone(
     observations: &Observations,
     inliers: &[u32],
+    framed: &[FramedMatch],
     q_21: &UnitQuaternion<f64>,
     sigma: f64,
 ) -> UnitQuaternion<f64> {
+    let some = &framed[..framed.len().min(FITTED)];
     let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
     let wide = GemanMcClure::new(2.0 * SCALE * sigma);
     let starts = [*q_21, best_rotation(&matches)].map(|mut q| {
-        let cost = refine_rotation(observations, inliers, &mut q, &wide, STEPS);
+        let cost = refine_rotation(some, &mut q, &wide, STEPS);
         (q, cost)
     });
     let mut q = if starts[1].1 < starts[0].1 { starts[1].0 } else { starts[0].0 };
-    refine_rotation(observations, inliers, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
+    refine_rotation(framed, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
     q
 }
 

@@ -15,9 +15,6 @@ use nalgebra::{Matrix3, Vector3};
 use crate::Correspondence;
 use crate::epipolar_frame::tangent_basis;
 
-/// The columns are padded to a multiple of this.
-pub(super) const LANES: usize = 8;
-
 /// How a match as it was given lies on the plane `z = 1`: rounding.
 const ON_PLANE: f64 = 1e-9;
 
@@ -38,6 +35,15 @@ pub(super) struct Frame {
     pub(super) d: [Vector3<f64>; 2],
 }
 
+/// A match as vectors, with the frames of both views around them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FramedMatch {
+    pub(super) x1: Vector3<f64>,
+    pub(super) x2: Vector3<f64>,
+    pub(super) frame1: Frame,
+    pub(super) frame2: Frame,
+}
+
 /// The matches of one estimate.
 #[derive(Debug)]
 pub(super) struct Observations {
@@ -49,8 +55,6 @@ pub(super) struct Observations {
     pub(super) images: [Image; 2],
     /// `x1` and `x2`, six columns.
     columns: [Vec<f64>; 6],
-    /// The same in single precision, padded with points that fit nothing.
-    single: [Vec<f32>; 6],
 }
 
 impl Observations {
@@ -73,8 +77,7 @@ impl Observations {
     }
 
     fn in_images(matches: Vec<Correspondence>, order: Vec<usize>, images: [Image; 2]) -> Self {
-        let padded = matches.len().next_multiple_of(LANES);
-        let mut columns: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(padded));
+        let mut columns: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(matches.len()));
         for m in &matches {
             let x1 = images[0].scaled(m.bearing1());
             let x2 = images[1].scaled(m.bearing2());
@@ -82,13 +85,7 @@ impl Observations {
                 column.push(*x);
             }
         }
-        let single = columns.each_ref().map(|column| {
-            #[expect(clippy::cast_possible_truncation, reason = "single precision is what is asked for")]
-            let mut single: Vec<f32> = column.iter().map(|&x| x as f32).collect();
-            single.resize(padded, f32::NAN);
-            single
-        });
-        Self { matches, order, images, columns, single }
+        Self { matches, order, images, columns }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -110,11 +107,6 @@ impl Observations {
         Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j])
     }
 
-    /// The six columns in single precision.
-    pub(super) fn single(&self) -> &[Vec<f32>; 6] {
-        &self.single
-    }
-
     /// The six columns.
     pub(super) fn columns(&self) -> &[Vec<f64>; 6] {
         &self.columns
@@ -133,13 +125,20 @@ impl Observations {
         self.images.iter().map(|image| 1.0 / image.square_focal_length()).sum()
     }
 
-    /// The matches as vectors on which the frames act, and the frame of each view.
-    pub(super) fn framed(&self, index: usize) -> [(Vector3<f64>, Frame); 2] {
+    /// A match as vectors on the planes `z = 1`, or as unit bearings.
+    pub(super) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
         let m = &self.matches[index];
-        [(self.images[0], m.bearing1()), (self.images[1], m.bearing2())].map(|(image, b)| match image {
-            Image::Plane(_) => (b / b.z, image.frame(b)),
-            Image::Sphere(_) => (*b, image.frame(b)),
-        })
+        let (a, b) = (m.bearing1(), m.bearing2());
+        if self.is_sphere() { [*a, *b] } else { [a / a.z, b / b.z] }
+    }
+
+    /// Some of the matches with the frames of both views.
+    pub(super) fn framed(&self, indices: &[u32]) -> Vec<FramedMatch> {
+        let framed = |&index: &u32| {
+            let [x1, x2] = self.vectors(index as usize);
+            FramedMatch { x1, x2, frame1: self.images[0].frame(&x1), frame2: self.images[1].frame(&x2) }
+        };
+        indices.iter().map(framed).collect()
     }
 
     /// The signed Sampson error of every match in pixels.

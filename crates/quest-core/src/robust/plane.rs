@@ -20,7 +20,7 @@ use crate::solver::motion::Motion;
 const SAMPLES: usize = 60;
 
 /// Points that a sample is judged by, and that the homography is refined over.
-const JUDGES: usize = 150;
+const JUDGES: usize = 120;
 
 /// The 99 % quantile of χ² with two degrees of freedom: what a match counts at most.
 pub(super) const CAP: f64 = 9.21;
@@ -48,7 +48,7 @@ pub(super) struct InverseDepth {
 
 /// The signed inverse depth `ρ = −(x2 × t) · (x2 × R x1) / |x2 × t|²` of a match in view 1.
 pub(super) fn inverse_depth(observations: &Observations, motion: &Motion, index: usize) -> InverseDepth {
-    let [(x1, _), (x2, _)] = observations.framed(index);
+    let [x1, x2] = observations.vectors(index);
     let across = x2.cross(&motion.direction);
     let square = across.norm_squared().max(1e-18);
     let value = -across.dot(&x2.cross(&(motion.q_21 * x1))) / square;
@@ -69,7 +69,7 @@ pub(super) fn fit(
     let g = most_common_plane(&depths, CAP * sigma * sigma, rng)?;
     let mut homography = motion.q_21.to_rotation_matrix().into_inner() + motion.direction * g.transpose();
     let loss = GemanMcClure::new(1.5 * SCALE * sigma);
-    refine_homography(observations, judges, &mut homography, &loss, STEPS);
+    refine_homography(&observations.framed(judges), &mut homography, &loss, STEPS);
     Some(Plane { homography, motions: homography::motions(&homography) })
 }
 

@@ -101,7 +101,7 @@ impl<'a> PoseScorer<'a> {
         let (mut cost, mut support) = (0.0, 0);
         let depth = self.depth_test(&motion);
         for (i, (index, r)) in (0_u32..).zip(&self.residuals).enumerate() {
-            let loss = loss(r / reach);
+            let loss = loss(r / reach, self.residuals.len());
             if r.abs() >= limit.max(reach) {
                 cost += loss;
             } else if matches!(depth(i), Side::InFront | Side::Far) {

@@ -5,7 +5,7 @@
 //! the best hypothesis as it was before its refinement, which leaves more starts for refinement than the refined one
 //! would.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::loss::Biweight;
 use super::observations::Observations;
@@ -13,15 +13,16 @@ use super::options::KnownDirection;
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
 use super::sampling::{MAX_SAMPLE, Sampler};
-use super::score::{REACH, Scorer};
+use super::score::{MANY, REACH, Scorer};
 use super::stopping;
+use crate::lanes::{BatchSolver, Essentials, Tolerance};
 use crate::solver::SolverName;
-use crate::solver::essentials::essentials_of_five;
 use crate::solver::motion::Motion;
-use crate::{Candidates, Correspondence, solver};
+use crate::{Candidates, Correspondence, alignment::best_rotation, solver};
 
-/// Samples that are solved before their hypotheses are scored.
-const BLOCK: usize = 16;
+/// Samples that are solved together before their hypotheses are scored: a few at first, where a few may do.
+const FIRST_BLOCK: usize = 8;
+const BLOCK: usize = 32;
 
 /// Rounds of local optimisation, each with the inliers of the last.
 const ROUNDS: usize = 3;
@@ -33,12 +34,12 @@ const MATCHES: usize = 200;
 /// Where the loss of the local optimisation levels off, in units of the threshold.
 const WIDTH: f64 = 4.0;
 
-/// With fewer matches every hypothesis is refined and kept.
-pub(super) const MANY: usize = 10;
-
 /// Costs closer than this are equal: five matches are fitted exactly by every solution. The smaller rotation then comes
 /// first, as among candidates.
 const EQUAL: f64 = 1e-3;
+
+/// Bearings this close after a rotation are turned into each other to rounding.
+const EXACT: f64 = 1e-12;
 
 /// What stops the search.
 #[derive(Clone, Copy, Debug)]
@@ -53,11 +54,14 @@ pub(super) struct Limits {
 pub(super) struct Search<'a> {
     observations: &'a Observations,
     solver: SolverName,
+    lanes: BatchSolver,
+    essentials: Essentials,
+    samples: Vec<[usize; MAX_SAMPLE]>,
     direction: Option<KnownDirection>,
     scorer: Scorer<'a>,
     pub(super) poses: PoseScorer<'a>,
     /// The best cost of a hypothesis before refinement.
-    best_hypothesis: f32,
+    best_hypothesis: f64,
     /// The best pose.
     pub(super) best: Option<Scored>,
     /// Of few matches, every pose that was found, refined.
@@ -78,10 +82,13 @@ impl<'a> Search<'a> {
         Self {
             observations,
             solver,
+            lanes: BatchSolver::new(Tolerance::Loop),
+            essentials: Essentials::new(),
+            samples: Vec::new(),
             direction,
             scorer: Scorer::new(observations, threshold),
             poses: PoseScorer::new(observations, threshold),
-            best_hypothesis: observations.len() as f32,
+            best_hypothesis: observations.len() as f64,
             best: None,
             all: Vec::new(),
             iterations: 0,
@@ -92,28 +99,28 @@ impl<'a> Search<'a> {
     /// Draws samples until the limits say that it is enough.
     pub(super) fn run(&mut self, sampler: &mut Sampler, limits: &Limits) {
         let mut enough = self.enough(limits);
+        let mut block = FIRST_BLOCK;
         while self.iterations < enough {
-            let count = BLOCK.min(enough - self.iterations);
+            self.samples.clear();
+            let mut sample = [0; MAX_SAMPLE];
+            while self.samples.len() < block.min(enough - self.iterations)
+                && sampler.draw(&mut sample).is_some()
+            {
+                self.samples.push(sample);
+            }
+            if self.samples.is_empty() {
+                break;
+            }
+            self.iterations += self.samples.len();
             let mut hypotheses = std::mem::take(&mut self.hypotheses);
             hypotheses.clear();
-            let mut is_last = false;
-            for _ in 0..count {
-                let mut sample = [0; MAX_SAMPLE];
-                is_last = sampler.draw(&mut sample).is_none();
-                if is_last {
-                    break;
-                }
-                self.iterations += 1;
-                self.solve(&sample, &mut hypotheses);
-            }
+            self.solve(&mut hypotheses);
             for e in &hypotheses {
                 self.consider(e);
             }
             self.hypotheses = hypotheses;
-            if is_last {
-                break;
-            }
             enough = self.enough(limits);
+            block = BLOCK;
         }
     }
 
@@ -132,22 +139,38 @@ impl<'a> Search<'a> {
         needed.max(limits.min_iterations).min(limits.max_iterations)
     }
 
-    /// The essential matrices of a sample.
-    fn solve(&self, sample: &[usize; MAX_SAMPLE], hypotheses: &mut Vec<Matrix3<f64>>) {
-        let size = self.solver.info().min_matches;
-        let matches: [Correspondence; MAX_SAMPLE] = sample.map(|i| self.observations.matches[i]);
-        if let (SolverName::Quest, Some(five)) = (self.solver, matches.first_chunk::<5>()) {
-            return essentials_of_five(five, |e| hypotheses.push(e));
+    /// The essential matrices of the samples.
+    fn solve(&mut self, hypotheses: &mut Vec<Matrix3<f64>>) {
+        let matches = &self.observations.matches;
+        if self.solver == SolverName::Quest {
+            #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
+            let five: Vec<[u32; 5]> =
+                self.samples.iter().map(|sample| std::array::from_fn(|k| sample[k] as u32)).collect();
+            // Every index is one of a match: there is no error.
+            if self.lanes.solve(matches, &five, &mut self.essentials).is_ok() {
+                hypotheses.extend(self.essentials.matrices().iter().map(|e| Matrix3::from_row_slice(e)));
+            }
+            let empty = (0..five.len()).filter(|&k| self.essentials.of(k).is_empty());
+            for sample in empty.map(|k| &five[k]) {
+                hypotheses.extend(turned_in_place(&sample.map(|i| matches[i as usize])));
+            }
+            return;
         }
-        let mut candidates = Candidates::new();
-        self.solver.solve(solver::Kinds::Exact, &matches[..size], &mut candidates);
-        let first = hypotheses.len();
-        for candidate in candidates.iter() {
-            let e = candidate.pose.essential().normalize();
-            // Twisted pairs have one essential matrix, of either sign.
-            let is_new = |other: &Matrix3<f64>| e.dot(other).abs() < 1.0 - 1e-12;
-            if e.iter().all(|x| x.is_finite()) && hypotheses[first..].iter().all(is_new) {
-                hypotheses.push(e);
+        let size = self.solver.info().min_matches;
+        for sample in &self.samples {
+            let all = sample.map(|i| matches[i]);
+            let mut candidates = Candidates::new();
+            self.solver.solve(solver::Kinds::Exact, &all[..size], &mut candidates);
+            let first = hypotheses.len();
+            for candidate in candidates.iter() {
+                let pose = &candidate.pose;
+                let t = pose.t_21.try_normalize(0.0).unwrap_or_else(Vector3::x);
+                let e = t.cross_matrix() * pose.r_21();
+                // Twisted pairs have one essential matrix, of either sign.
+                let is_new = |other: &Matrix3<f64>| e.dot(other).abs() < 2.0 - 1e-12;
+                if e.iter().all(|x| x.is_finite()) && hypotheses[first..].iter().all(is_new) {
+                    hypotheses.push(e);
+                }
             }
         }
     }
@@ -161,16 +184,14 @@ impl<'a> Search<'a> {
             return;
         }
         let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
-        #[expect(clippy::cast_possible_truncation, reason = "single precision, as the scores of hypotheses")]
-        let cost = scored.cost as f32;
-        if cost < self.best_hypothesis {
-            self.best_hypothesis = cost;
+        if scored.cost < self.best_hypothesis {
+            self.best_hypothesis = scored.cost;
             let optimised = self.optimise(scored);
             self.keep(optimised);
         }
     }
 
-    /// Of few matches every hypothesis is refined: the scores hardly tell them apart.
+    /// Of few matches every hypothesis is refined and kept: the scores hardly tell them apart.
     fn consider_one_of_few(&mut self, e: &Matrix3<f64>) {
         let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
         let optimised = self.optimise(scored);
@@ -224,4 +245,12 @@ impl<'a> Search<'a> {
         }
         best
     }
+}
+
+/// The essential matrix of matches that a rotation alone explains to the last digit, with one of the translations that they
+/// leave open.
+fn turned_in_place(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
+    let q_21 = best_rotation(matches);
+    let is_exact = matches.iter().all(|m| (q_21 * m.bearing1()).cross(m.bearing2()).norm() < EXACT);
+    is_exact.then(|| Vector3::<f64>::x().cross_matrix() * q_21.to_rotation_matrix().into_inner())
 }

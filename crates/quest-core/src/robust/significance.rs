@@ -18,7 +18,7 @@ use crate::Correspondence;
 use crate::solver::motion::Motion;
 
 /// False matches that are looked at.
-const FALSE_MATCHES: usize = 1_000;
+const FALSE_MATCHES: usize = 300;
 
 /// False matches are counted up to this multiple of the threshold: there are more of them.
 const WIDE: f64 = 3.0;

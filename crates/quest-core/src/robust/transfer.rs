@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::loss::Loss;
-use super::observations::{Frame, Observations};
+use super::observations::{Frame, FramedMatch};
 
 /// A residual and its derivatives by `y = H x1`.
 struct Whitened {
@@ -18,8 +18,8 @@ struct Whitened {
 }
 
 /// `None` where the point is taken behind the camera.
-fn whitened(observations: &Observations, h: &Matrix3<f64>, index: usize) -> Option<Whitened> {
-    let [(x1, frame1), (x2, frame2)] = observations.framed(index);
+fn whitened(h: &Matrix3<f64>, m: &FramedMatch) -> Option<Whitened> {
+    let FramedMatch { x1, x2, frame1, frame2 } = *m;
     let y = h * x1;
     let Frame { e, n, .. } = frame2;
     let depth = y.dot(&n);
@@ -43,9 +43,8 @@ fn whitened(observations: &Observations, h: &Matrix3<f64>, index: usize) -> Opti
 }
 
 /// The squared whitened residual of a match, infinite where its point is taken behind the camera.
-pub(super) fn square_error(observations: &Observations, h: &Matrix3<f64>, index: usize) -> f64 {
-    whitened(observations, h, index)
-        .map_or(f64::INFINITY, |w| w.residual[0] * w.residual[0] + w.residual[1] * w.residual[1])
+pub(super) fn square_error(h: &Matrix3<f64>, m: &FramedMatch) -> f64 {
+    whitened(h, m).map_or(f64::INFINITY, |w| w.residual[0] * w.residual[0] + w.residual[1] * w.residual[1])
 }
 
 /// The normal equations in `P` parameters.
@@ -56,15 +55,14 @@ struct Equations<const P: usize> {
 }
 
 fn equations<const P: usize>(
-    observations: &Observations,
-    indices: &[u32],
+    matches: &[FramedMatch],
     h: &Matrix3<f64>,
     loss: &impl Loss,
     row: impl Fn(&Vector3<f64>, &Whitened) -> SVector<f64, P>,
 ) -> Equations<P> {
     let (mut cost, mut hessian, mut gradient) = (0.0, SMatrix::zeros(), SVector::zeros());
-    for &index in indices {
-        let Some(w) = whitened(observations, h, index as usize) else {
+    for m in matches {
+        let Some(w) = whitened(h, m) else {
             cost += loss.cost_and_weight(f64::MAX.sqrt()).0;
             continue;
         };
@@ -126,8 +124,7 @@ fn minimise<const P: usize, M: Clone>(
 
 /// Refines a homography of any scale over some of the matches.
 pub(super) fn refine_homography(
-    observations: &Observations,
-    indices: &[u32],
+    matches: &[FramedMatch],
     h: &mut Matrix3<f64>,
     loss: &impl Loss,
     max_steps: usize,
@@ -138,15 +135,14 @@ pub(super) fn refine_homography(
     minimise(
         h,
         max_steps,
-        |h| equations(observations, indices, h, loss, row),
+        |h| equations(matches, h, loss, row),
         |h, step| (h + Matrix3::from_fn(|i, j| step[3 * i + j])).normalize(),
     )
 }
 
 /// Refines a rotation over some of the matches.
 pub(super) fn refine_rotation(
-    observations: &Observations,
-    indices: &[u32],
+    matches: &[FramedMatch],
     q_21: &mut UnitQuaternion<f64>,
     loss: &impl Loss,
     max_steps: usize,
@@ -155,18 +151,14 @@ pub(super) fn refine_rotation(
     minimise(
         q_21,
         max_steps,
-        |q| equations(observations, indices, &q.to_rotation_matrix().into_inner(), loss, row),
+        |q| equations(matches, &q.to_rotation_matrix().into_inner(), loss, row),
         |q, step| UnitQuaternion::new_normalize((UnitQuaternion::new(*step) * q).into_inner()),
     )
 }
 
 /// `Σ Jᵀ J` of a rotation, without weights.
-pub(super) fn rotation_hessian(
-    observations: &Observations,
-    indices: &[u32],
-    q_21: &UnitQuaternion<f64>,
-) -> Matrix3<f64> {
+pub(super) fn rotation_hessian(matches: &[FramedMatch], q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
     let row = |slope: &Vector3<f64>, w: &Whitened| w.y.cross(slope);
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    equations(observations, indices, &r_21, &super::loss::Truncated::new(f64::INFINITY), row).hessian
+    equations(matches, &r_21, &super::loss::Truncated::new(f64::INFINITY), row).hessian
 }

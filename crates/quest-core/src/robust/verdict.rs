@@ -15,7 +15,8 @@ use super::plane::{self, Plane};
 use super::polish::{FEWEST, Polished, SCALE, polish};
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
-use super::search::{MANY, Search};
+use super::score::MANY;
+use super::search::Search;
 use super::significance::is_significant;
 use super::transfer::square_error;
 use crate::RelativePose;
@@ -34,7 +35,7 @@ const CLEARLY: f64 = 1e-4;
 
 /// Inliers that an alternative is first refined over, steps, and how far it looks in units of the threshold.
 const MATCHES: usize = 200;
-const STEPS: usize = 15;
+const STEPS: usize = 8;
 const WIDE: f64 = 2.0;
 
 /// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
@@ -77,18 +78,12 @@ fn alternatives(poses: &mut PoseScorer, plane: &Plane, sigma: f64) -> Vec<Altern
     for motion in plane.motions.iter().flatten() {
         let Some(of_plane) = poses.best_pose(&motion.essential(), wide) else { continue };
         let mut refined = of_plane;
-        for most in [MATCHES, usize::MAX] {
-            let count = poses.inliers.len().min(most);
-            if count < FEWEST {
-                break;
-            }
+        let count = poses.inliers.len().min(MATCHES);
+        if count >= FEWEST {
             let subset = Subset::new(poses.observations, &poses.inliers[..count]);
-            let mut motion = refined.motion;
+            let mut motion = of_plane.motion;
             refine(poses.observations, &subset, &mut motion, &loss, STEPS);
             refined = poses.best_pose(&motion.essential(), wide).unwrap_or(refined);
-            if poses.inliers.len() <= count {
-                break;
-            }
         }
         all.push(Alternative { of_plane, refined });
     }
@@ -133,7 +128,7 @@ fn assemble(
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold).powi(2);
-        poses.inliers.retain(|&i| square_error(observations, &r_21, i as usize) < limit);
+        poses.inliers.retain(|&i| square_error(&r_21, &observations.framed(&[i])[0]) < limit);
     }
     let inliers = poses.inliers.clone();
     let size = length(observations, &motion, &inliers, sigma);

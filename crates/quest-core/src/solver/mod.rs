@@ -5,7 +5,6 @@ mod consensus;
 mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
-pub(crate) mod essentials;
 mod five_point;
 mod gram;
 mod hidden_variable;
