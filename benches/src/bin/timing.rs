@@ -11,7 +11,7 @@ use quest_benches::cells::Cell;
 use quest_benches::statistics::{mean, percentile, sorted};
 use quest_benches::{SEED, errors};
 use quest_core::quaternion::constraint_matrix_5;
-use quest_core::simulate::{Scene, SceneError, SceneOptions};
+use quest_core::simulate::{Layout, Scene, SceneError, SceneOptions};
 use quest_core::solver::SolverName;
 use quest_core::{Candidates, Correspondence};
 
@@ -25,7 +25,7 @@ struct Arguments {
     #[arg(long, default_value_t = 100)]
     rounds: usize,
     /// Matches of a scene
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(5..))]
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(4..))]
     points: u64,
     /// Seed of the scenes
     #[arg(long, default_value_t = SEED)]
@@ -53,21 +53,21 @@ struct Row<'a> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let noisy = scenes(&arguments, 0.75)?;
+    let noisy = Scenes::new(&arguments, 0.75)?;
     let solvers: &[SolverName] =
         if arguments.solvers.is_empty() { &SolverName::ALL } else { &arguments.solvers };
     let cells = Cell::of(solvers, usize::try_from(arguments.points)?);
     if let Some(solves) = arguments.callgrind {
         let cell = cells.get(usize::from(!arguments.exact)).ok_or("too few matches for this solver")?;
-        only_solve(*cell, &noisy, solves);
+        only_solve(*cell, noisy.of(cell.solver), solves);
         return Ok(());
     }
-    let clean = scenes(&arguments, 0.0)?;
+    let clean = Scenes::new(&arguments, 0.0)?;
     let mut rows: Vec<_> = cells.iter().map(|&cell| solver_row(cell, &noisy, &clean)).collect();
     if arguments.points == 5 {
         #[cfg(feature = "peers")]
-        rows.push(peer_row(&noisy, &clean));
-        rows.push(stage_row(&noisy));
+        rows.push(peer_row(&noisy.general, &clean.general));
+        rows.push(stage_row(&noisy.general));
     }
     // The rounds of the rows take turns, so that a disturbance of the machine falls on all of them.
     for _ in 0..arguments.rounds {
@@ -85,12 +85,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn scenes(arguments: &Arguments, noise_px: f64) -> Result<Vec<Scene>, Box<dyn Error>> {
-    let points = usize::try_from(arguments.points)?;
-    let options = SceneOptions { noise_px, points, ..SceneOptions::realistic() };
-    let all: Result<_, SceneError> =
-        (0..arguments.scenes).map(|index| Scene::generate(&options, arguments.seed, index)).collect();
-    Ok(all?)
+/// The same scenes for every solver; those of a plane for `homography`, which knows no other.
+struct Scenes {
+    general: Vec<Scene>,
+    planar: Vec<Scene>,
+}
+
+impl Scenes {
+    fn new(arguments: &Arguments, noise_px: f64) -> Result<Self, Box<dyn Error>> {
+        let points = usize::try_from(arguments.points)?;
+        let of = |layout| -> Result<_, SceneError> {
+            let options = SceneOptions { layout, noise_px, points, ..SceneOptions::realistic() };
+            (0..arguments.scenes).map(|index| Scene::generate(&options, arguments.seed, index)).collect()
+        };
+        Ok(Self { general: of(Layout::General)?, planar: of(Layout::Coplanar)? })
+    }
+
+    fn of(&self, solver: SolverName) -> &[Scene] {
+        if solver == SolverName::Homography { &self.planar } else { &self.general }
+    }
 }
 
 fn only_solve(cell: Cell, scenes: &[Scene], solves: usize) {
@@ -101,7 +114,8 @@ fn only_solve(cell: Cell, scenes: &[Scene], solves: usize) {
     }
 }
 
-fn solver_row<'a>(cell: Cell, noisy: &'a [Scene], clean: &[Scene]) -> Row<'a> {
+fn solver_row<'a>(cell: Cell, noisy: &'a Scenes, clean: &Scenes) -> Row<'a> {
+    let (noisy, clean) = (noisy.of(cell.solver), clean.of(cell.solver));
     let solve = |scene: &Scene| {
         let mut out = Candidates::new();
         cell.solve(&scene.matches, &mut out);

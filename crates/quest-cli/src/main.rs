@@ -1,15 +1,22 @@
-//! `quest-cli`: candidate poses from matched points.
+//! `quest-cli`: camera poses from matched points.
 //!
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+mod estimate;
+mod estimate_table;
+mod input;
 mod options;
+mod progress;
 mod rows;
+mod servo;
 mod simulate;
 mod solve;
 mod solvers;
 mod table;
+mod view;
 mod words;
+mod writer;
 
 use std::process::ExitCode;
 
@@ -18,8 +25,10 @@ use clap::{Parser, Subcommand};
 const EXAMPLES: &str = "\
 Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
+  quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli solve --format json pair.json | jq     the same for programs
   quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
+  quest-cli servo --scenario robot --noise 0.5     a robot that drives to where an image was taken
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -35,7 +44,10 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Solve(Box<solve::Arguments>),
+    Estimate(Box<estimate::Arguments>),
     Simulate(Box<simulate::Arguments>),
+    Servo(Box<servo::Arguments>),
+    View(view::Arguments),
     Solvers(solvers::Arguments),
 }
 
@@ -64,7 +76,10 @@ enum Failure {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
+        Command::Estimate(arguments) => estimate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Servo(arguments) => servo::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

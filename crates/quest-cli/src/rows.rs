@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use quest_io::{CandidateRecord, SolveRecord};
+use quest_io::{CandidateRecord, EstimateRecord, SolveRecord};
 use serde::Serialize;
 
 /// One line of JSON.
@@ -78,6 +78,57 @@ fn row(pair: usize, number: usize, record: &SolveRecord, c: &CandidateRecord) ->
         error(c.rotation_error_deg),
         error(c.translation_error_deg),
     ]
+}
+
+/// The columns of [`write_estimate`]. Inliers and covariance are left to JSON.
+const ESTIMATE_COLUMNS: [&str; 18] = [
+    "pair",
+    "name",
+    "model",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "tx",
+    "ty",
+    "tz",
+    "parallax",
+    "inlier_count",
+    "matches",
+    "score",
+    "iterations",
+    "elapsed_ms",
+    "rotation_error_deg",
+    "translation_error_deg",
+];
+
+/// One row of CSV for the estimate of the pair with number `pair`, counted from one, its fields empty where there is no
+/// pose; the first pair brings the header.
+pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &EstimateRecord) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(writer);
+    if pair == 1 {
+        csv.write_record(ESTIMATE_COLUMNS)?;
+    }
+    let mut row = vec![
+        pair.to_string(),
+        record.name.clone().unwrap_or_default(),
+        record.model.unwrap_or_default().to_owned(),
+    ];
+    match &record.found {
+        Some(found) => {
+            let pose = &found.pose;
+            row.extend(pose.q_21.into_iter().chain(pose.t_21).chain([pose.parallax]).map(text));
+            row.extend([found.inlier_count.to_string(), found.inliers.len().to_string(), text(found.score)]);
+            row.push(found.iterations.to_string());
+        }
+        None => row.extend(std::iter::repeat_n(String::new(), 12)),
+    }
+    row.push(text(record.elapsed_ms));
+    for error in [record.rotation_error_deg, record.translation_error_deg] {
+        row.push(error.map(text).unwrap_or_default());
+    }
+    csv.write_record(row)?;
+    csv.flush()
 }
 
 /// All digits, with an exponent where it is shorter; nothing for what is not a number.

@@ -1,18 +1,20 @@
 //! `quest-cli solve`: candidate poses from five or more correct matches.
 
-use std::{collections::HashSet, path::PathBuf};
+use std::io::{self, Write};
 
 use clap::{Args, ValueEnum};
 use quest_core::{
-    Camera, Candidates, Degeneracy, InputError,
+    Candidates, Degeneracy, InputError,
     solver::{Kinds, SolverName},
 };
-use quest_io::{Fault, Output, Pair, ReadError, SolveRecord, WriteError};
+use quest_io::{Pair, SolveRecord};
 
 use crate::{
     Failure, Outcome, candidate_table,
-    options::{Format, InputFormat, OutputOptions, parse_camera, solver_parser},
+    input::InputOptions,
+    options::{OutputOptions, solver_parser},
     rows, words,
+    writer::{Record, Writer},
 };
 
 const EXAMPLES: &str = "\
@@ -48,8 +50,8 @@ Exit status:
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// The matches: .json, .jsonl or .csv; `-` is standard input.
-    file: PathBuf,
+    #[command(flatten)]
+    input: InputOptions,
     /// The solver; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
@@ -59,15 +61,6 @@ pub(crate) struct Arguments {
     /// List also the candidates that have points behind a camera.
     #[arg(long)]
     all: bool,
-    /// The camera of view 1, and of view 2 where it has none of its own. Takes the place of the file's.
-    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
-    camera1: Option<Camera>,
-    /// The camera of view 2. Takes the place of the file's.
-    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
-    camera2: Option<Camera>,
-    /// The form of the input [default: after its extension, else after its beginning].
-    #[arg(long, value_enum, hide_default_value = true)]
-    input_format: Option<InputFormat>,
     #[command(flatten)]
     output: OutputOptions,
 }
@@ -79,22 +72,11 @@ enum KindsArgument {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let pairs = quest_io::read(&arguments.file, arguments.input_format.map(Into::into))?;
-    let is_lines = pairs.format() == quest_io::Format::JsonLines;
-    let format = arguments.output.format(if is_lines { Format::Jsonl } else { Format::Table });
-    let mut writer = Writer { output: arguments.output.open()?, format, pairs: 0, kept: Vec::new() };
-    let mut told = HashSet::new();
+    let mut pairs = arguments.input.open(arguments.output.quiet)?;
+    let is_lines = pairs.is_lines();
+    let mut writer = Writer::open(&arguments.output, is_lines)?;
     let mut outcome = Outcome::Answer;
-    for pair in pairs {
-        let mut pair = pair?;
-        pair.unknown_keys.retain(|key| told.insert(key.clone()));
-        if !pair.unknown_keys.is_empty() && !arguments.output.quiet {
-            words::say(
-                "warning",
-                &format!("{}: ignored unknown keys: {}", pair.place, pair.unknown_keys.join(", ")),
-            );
-        }
-        arguments.set_cameras(&mut pair)?;
+    while let Some(pair) = pairs.next()? {
         if let Outcome::NoPose = one_pair(arguments, &pair, is_lines, &mut writer)? {
             outcome = Outcome::NoPose;
         }
@@ -103,27 +85,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(outcome)
 }
 
-impl Arguments {
-    /// Cameras of the command line take the place of the file's.
-    fn set_cameras(&self, pair: &mut Pair) -> Result<(), ReadError> {
-        let cameras = match (self.camera1, self.camera2, pair.cameras) {
-            (None, None, cameras) => cameras,
-            (Some(camera1), camera2, _) => Some([camera1, camera2.unwrap_or(camera1)]),
-            (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2]),
-            (None, Some(_), None) => {
-                return Err(pair.place.clone().error(Fault::FirstCameraMissing));
-            }
-        };
-        pair.cameras = cameras;
-        Ok(())
-    }
-}
-
 fn one_pair(
     arguments: &Arguments,
     pair: &Pair,
     is_lines: bool,
-    writer: &mut Writer,
+    writer: &mut Writer<SolveRecord>,
 ) -> Result<Outcome, Failure> {
     let info = arguments.solver.info();
     let matches = pair.correspondences()?;
@@ -179,46 +145,12 @@ fn heading(pair: &Pair, record: &SolveRecord, degeneracy: Option<Degeneracy>) ->
     words::one_line(&format!("{name}: {} matches, solver {}{degeneracy}", record.matches, record.solver))
 }
 
-/// Writes results in the format asked for.
-struct Writer {
-    output: Output,
-    format: Format,
-    /// How many results there were.
-    pairs: usize,
-    /// The results of `--format json`, which are one value.
-    kept: Vec<SolveRecord>,
-}
-
-impl Writer {
-    fn write(&mut self, heading: &str, record: SolveRecord, focal: Option<f64>) -> Result<(), WriteError> {
-        self.pairs += 1;
-        let is_first = self.pairs == 1;
-        match self.format {
-            Format::Json => {
-                self.kept.push(record);
-                Ok(())
-            }
-            Format::Jsonl => self.output.write(|w| rows::write_line(w, &record)),
-            Format::Csv => self.output.write(|w| rows::write_candidates(w, self.pairs, &record)),
-            Format::Table => self.output.write(|w| {
-                writeln!(w, "{}{heading}", if is_first { "" } else { "\n" })?;
-                if record.candidates.is_empty() {
-                    return Ok(());
-                }
-                writeln!(w, "\n{}", candidate_table::text(&record, focal))
-            }),
-        }
+impl Record for SolveRecord {
+    fn table(&self, focal_length: Option<f64>) -> Option<String> {
+        (!self.candidates.is_empty()).then(|| candidate_table::text(self, focal_length))
     }
 
-    /// One pair is one JSON object, JSON Lines are a list of them.
-    fn finish(mut self, is_list: bool) -> Result<(), WriteError> {
-        if self.format == Format::Json {
-            let kept = &self.kept;
-            self.output.write(|w| match kept.as_slice() {
-                [one] if !is_list => quest_io::write_json(w, one),
-                all => quest_io::write_json(w, all),
-            })?;
-        }
-        self.output.finish()
+    fn write_csv(&self, writer: &mut dyn Write, pair: usize) -> io::Result<()> {
+        rows::write_candidates(writer, pair, self)
     }
 }

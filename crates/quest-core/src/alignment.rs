@@ -38,9 +38,18 @@ fn outer_sum(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) 
 
 fn align(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> UnitQuaternion<f64> {
     let sum = outer_sum(matches, &sign);
-    let below = -(matches.len() as f64);
-    match smallest_eigenvector_4(&bilinear(&sum), below) {
-        Some(q) => polished(UnitQuaternion::new_normalize(from_wxyz(&q)), matches, sign),
+    polished(rotation_of_outer_sum(&sum, matches.len()), matches, sign)
+}
+
+/// [`best_rotation`] to rounding over how far the bearings are from a line.
+pub(crate) fn nearly_best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
+    rotation_of_outer_sum(&outer_sum(matches, |_| 1.0), matches.len())
+}
+
+/// The rotation that best aligns `count` bearings with `Σ b aᵀ = sum`, to rounding over how far they are from a line.
+pub(crate) fn rotation_of_outer_sum(sum: &Matrix3<f64>, count: usize) -> UnitQuaternion<f64> {
+    match smallest_eigenvector_4(&bilinear(sum), -(count as f64)) {
+        Some(q) => UnitQuaternion::new_normalize(from_wxyz(&q)),
         None => UnitQuaternion::identity(),
     }
 }

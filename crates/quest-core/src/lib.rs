@@ -43,6 +43,7 @@
 //! | 8 | translation and depths | [`structure`] |
 //! | 9 | random scenes, noise, error metrics | [`simulate`] |
 //! | 9.4 | the methods it is compared with | [`solver::nister`], [`solver::stewenius`], [`solver::li_hartley`], [`solver::kukelova`], [`solver::kneip`] |
+//! | 10, appendix C | visual servoing: control laws, the closed loop | [`servo`] |
 //! | appendix B | which poses are feasible | [`feasibility`] |
 //! | not in it | the default solver, right at every parallax | [`solver::quest`] |
 //! | not in it | linear methods for more matches | [`solver::eight_point`], [`solver::homography`] |
@@ -57,10 +58,13 @@ pub mod candidate;
 pub mod conventions {}
 pub mod correspondence;
 mod degeneracy;
+mod epipolar_frame;
 pub mod feasibility;
 pub mod lanes;
 pub mod pose;
 pub mod quaternion;
+pub mod robust;
+pub mod servo;
 pub mod simulate;
 pub mod solver;
 pub mod structure;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::Correspondence;
+use crate::algebra::two::Two;
 
 /// Two rays closer than this (the sine of their angle) are parallel to rounding: their depths are noise.
 pub(crate) const PARALLEL: f64 = 8.0 * f64::EPSILON;
@@ -120,12 +121,21 @@ impl RelativePose {
     }
 }
 
+/// The largest Sampson error: no bearing has to turn by more.
+pub(crate) const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+
 /// The squared Sampson error of the constraint `e = t · (b × c)` of unit vectors, by `t · b` and `t · c`.
 #[inline]
 pub(crate) fn sampson_square(e: f64, tb: f64, tc: f64) -> f64 {
-    // The squared gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e; no
-    // bearing has to turn by more than a right angle.
-    const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+    // The squared gradients in the tangent planes of both spheres. At an epipole both vanish, and so does e.
     let gradient2 = 2.0 - tb * tb - tc * tc - 2.0 * e * e;
     (e * e / gradient2.max(f64::MIN_POSITIVE)).min(RIGHT_ANGLE * RIGHT_ANGLE)
+}
+
+/// [`sampson_square`] of two matches at once.
+#[inline]
+pub(crate) fn sampson_squares(e: Two, tb: Two, tc: Two) -> Two {
+    let gradient2 = Two::splat(2.0) - tb * tb - tc * tc - Two::splat(2.0) * e * e;
+    let square = e * e / gradient2.fast_max(Two::splat(f64::MIN_POSITIVE));
+    square.fast_min(Two::splat(RIGHT_ANGLE * RIGHT_ANGLE))
 }

@@ -10,10 +10,11 @@
 //! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
 //! `|t|` is then the parallax (63), and goes to zero with it.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::smallest_eigenvector_3;
-use crate::pose::{PARALLEL, sampson_square};
+use crate::algebra::two::{Two, TwoVectors, both, count, cross, dot, side_by_side, times};
+use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
 
 /// The direction of the translation that fits the rotation best: the eigenvector of `Σ n nᵀ` with the smallest
@@ -51,37 +52,131 @@ pub fn with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Completed {
-    let r_21 = q_21.to_rotation_matrix();
-    let (mut front, mut behind, mut at_infinity) = (0, 0, 0);
-    let (mut absolute, mut signed, mut squares, mut count) = (0.0, 0.0, 0.0, 0);
-    for m in matches {
-        let (b, c) = (m.bearing2(), r_21 * m.bearing1());
-        let n = b.cross(&c);
-        let nn = n.norm_squared();
-        let (tb, tc, bc) = (direction.dot(b), direction.dot(&c), b.dot(&c));
-        squares += sampson_square(direction.dot(&n), tb, tc);
-        if nn <= PARALLEL * PARALLEL {
-            at_infinity += usize::from(bc > 0.0);
-            continue;
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let (mut squares, mut tally) = (0.0, Tally::default());
+    for pair in matches.chunks(2) {
+        let (rays, _) = Rays::new(pair, &r_21, direction);
+        squares += rays.sampson_squares(direction);
+        tally.add(&rays, pair);
+    }
+    tally.completed(q_21, direction, squares, matches)
+}
+
+/// The same for `q_21` and for its twisted partner `t ⊗ q`, which has the same residuals.
+pub(crate) fn pair_with_depths(
+    q_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> [Completed; 2] {
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let (mut squares, mut first, mut second) = (0.0, Tally::default(), Tally::default());
+    for pair in matches.chunks(2) {
+        let (rays, b) = Rays::new(pair, &r_21, direction);
+        squares += rays.sampson_squares(direction);
+        first.add(&rays, pair);
+        second.add(&rays.twisted(&b, direction), pair);
+    }
+    let twisted = UnitQuaternion::new_normalize(Quaternion::from_imag(*direction) * q_21.into_inner());
+    [
+        first.completed(q_21, direction, squares, matches),
+        second.completed(twisted, direction, squares, matches),
+    ]
+}
+
+/// What is needed of the rays of two matches (of one, and zeros), `b` of view 2 and `c` of view 1 after the rotation.
+struct Rays {
+    /// `b × c`.
+    normal: TwoVectors,
+    /// `b · c`.
+    cosine: Two,
+    /// `t · b` and `t · c`.
+    along: [Two; 2],
+}
+
+impl Rays {
+    /// Together with `b`.
+    #[inline]
+    fn new(pair: &[Correspondence], r_21: &Matrix3<f64>, direction: &Vector3<f64>) -> (Self, TwoVectors) {
+        let second = pair.get(1);
+        let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
+        let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
+        let (c, t) = (times(r_21, &a), both(direction));
+        (Self { normal: cross(&b, &c), cosine: dot(&b, &c), along: [dot(&t, &b), dot(&t, &c)] }, b)
+    }
+
+    /// With `c` turned by 180° about the translation, `c' = 2 t (t · c) − c`.
+    #[inline]
+    fn twisted(&self, b: &TwoVectors, direction: &Vector3<f64>) -> Self {
+        let ([tb, tc], across) = (self.along, cross(b, &both(direction)));
+        let twice = tc + tc;
+        Self {
+            normal: std::array::from_fn(|k| across[k] * twice - self.normal[k]),
+            cosine: tb * twice - self.cosine,
+            along: self.along,
         }
+    }
+
+    /// The sum of the squared Sampson errors.
+    #[inline]
+    fn sampson_squares(&self, direction: &Vector3<f64>) -> f64 {
+        let (e, [tb, tc]) = (dot(&both(direction), &self.normal), self.along);
+        sampson_squares(e, tb, tc).reduce_add()
+    }
+}
+
+/// What the matches say of the sign and the length of a translation.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    front: usize,
+    behind: usize,
+    /// Matches whose rays are not parallel.
+    with_depth: usize,
+    /// Matches whose rays are parallel and point the same way.
+    at_infinity: usize,
+    /// The sum of the depths, each before its division, and that of their absolute values.
+    signed: f64,
+    absolute: f64,
+}
+
+impl Tally {
+    #[inline]
+    fn add(&mut self, rays: &Rays, pair: &[Correspondence]) {
+        let (cosine, [tb, tc]) = (rays.cosine, rays.along);
+        let square = dot(&rays.normal, &rays.normal);
         // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
-        let (area1, area2) = (bc * tb - tc, tb - bc * tc);
-        front += usize::from(area1 > 0.0 && area2 > 0.0);
-        behind += usize::from(area1 < 0.0 && area2 < 0.0);
-        signed += area1 + area2;
-        let (length1, length2) = (m.length1(), m.length2());
-        count += 2;
-        absolute += (area1.abs() * length2 + area2.abs() * length1) / (nn * length1 * length2);
+        let (area1, area2) = (cosine * tb - tc, tb - cosine * tc);
+        let lengths = |of: fn(&Correspondence) -> f64| Two::new([of(&pair[0]), pair.get(1).map_or(1.0, of)]);
+        let (length1, length2) = (lengths(Correspondence::length1), lengths(Correspondence::length2));
+        let depths = (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
+        let is_apart = square.simd_gt(Two::splat(PARALLEL * PARALLEL));
+        let above = [area1, area2].map(|area| area.simd_gt(Two::ZERO));
+        let below = [area1, area2].map(|area| area.simd_lt(Two::ZERO));
+        self.with_depth += count(is_apart);
+        self.front += count(is_apart & above[0] & above[1]);
+        self.behind += count(is_apart & below[0] & below[1]);
+        self.at_infinity += count(!is_apart & cosine.simd_gt(Two::ZERO));
+        self.signed += (is_apart & (area1 + area2)).reduce_add();
+        self.absolute += (is_apart & depths).reduce_add();
     }
-    let residual = (squares / matches.len().max(1) as f64).sqrt();
-    if absolute == 0.0 {
-        let pose = RelativePose::new(q_21, Vector3::zeros());
-        return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
+
+    fn completed(
+        &self,
+        q_21: UnitQuaternion<f64>,
+        direction: &Vector3<f64>,
+        squares: f64,
+        matches: &[Correspondence],
+    ) -> Completed {
+        if self.absolute == 0.0 {
+            let pose = RelativePose::new(q_21, Vector3::zeros());
+            return Completed { pose, in_front: self.at_infinity, residual: pose.residual(matches) };
+        }
+        let Self { front, behind, .. } = *self;
+        let flip = behind > front || (behind == front && self.signed < 0.0);
+        let length = 2.0 * self.with_depth as f64 / self.absolute;
+        let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
+        let residual = (squares / matches.len() as f64).sqrt();
+        Completed { pose, in_front: self.at_infinity + if flip { behind } else { front }, residual }
     }
-    let flip = behind > front || (behind == front && signed < 0.0);
-    let length = f64::from(count) / absolute;
-    let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
-    Completed { pose, in_front: at_infinity + if flip { behind } else { front }, residual }
 }
 
 #[cfg(test)]
@@ -104,13 +199,13 @@ mod tests {
     /// The null vector of (58), (59) by SVD, from the quaternion equations (32) as printed.
     fn null_vector_of_59(q_21: &UnitQuaternion<f64>, matches: &[Correspondence]) -> [f64; 13] {
         let mut b = SMatrix::<f64, 20, 13>::zeros();
-        let column = |q: nalgebra::Quaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
+        let column = |q: Quaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
         let q = q_21.quaternion();
         for (i, m) in matches.iter().enumerate() {
-            let m1 = nalgebra::Quaternion::from_imag(m.bearing1() * m.length1());
-            let m2 = nalgebra::Quaternion::from_imag(m.bearing2() * m.length2());
+            let m1 = Quaternion::from_imag(m.bearing1() * m.length1());
+            let m2 = Quaternion::from_imag(m.bearing2() * m.length2());
             for k in 0..3 {
-                let e = nalgebra::Quaternion::from_imag(Vector3::ith(k, 1.0));
+                let e = Quaternion::from_imag(Vector3::ith(k, 1.0));
                 b.fixed_view_mut::<4, 1>(4 * i, k).copy_from(&column(e * q));
             }
             b.fixed_view_mut::<4, 1>(4 * i, 3 + 2 * i).copy_from(&column(q * m1));

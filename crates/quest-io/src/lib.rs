@@ -13,13 +13,14 @@
 //!
 //! - [`read`] opens a file or standard input and yields [`Pair`]s; what is wrong with a file is a
 //!   [`ReadError`]: one line with the place, what was found and what was expected.
-//! - [`SolveRecord`] is the result of a solve as it stands in files.
+//! - [`SolveRecord`] and [`EstimateRecord`] are the results of a solve and of an estimate as they stand in files.
 //! - [`Output`] writes a file whole or not at all; [`write_json`] writes JSON for people.
 #![forbid(unsafe_code)]
 
 mod camera;
 mod csv_file;
 mod error;
+mod estimate_record;
 mod json_file;
 mod json_text;
 mod json_words;
@@ -30,6 +31,7 @@ mod record;
 
 pub use camera::camera;
 pub use error::{Fault, Place, ReadError};
+pub use estimate_record::{EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord};
 pub use json_text::write_json;
 pub use output::{Output, WriteError};
 pub use pair::{Pair, Truth};

@@ -106,13 +106,13 @@ fn depths(pose: &RelativePose, m: &Correspondence) -> (Option<f64>, Option<f64>)
     pose.depths(m).map_or((None, None), |(z1, z2)| (finite(z1), finite(z2)))
 }
 
-fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(crate) fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
     let columns: [[f64; 3]; 3] = m.transpose().into();
     columns.map(|row| row.map(unsigned_zero))
 }
 
 /// Writes `-0.0` as `0.0`.
-fn unsigned_zero(x: f64) -> f64 {
+pub(crate) fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
 

@@ -13,13 +13,29 @@ pub struct Space {
     pub axes: [String; 3],
     /// What is drawn.
     pub parts: Vec<Part>,
+    /// The direction that is up when the page is opened.
+    pub up: [f64; 3],
+    /// From where the middle of the scene is seen then, in units of about its size.
+    pub eye: [f64; 3],
 }
 
 impl Space {
-    /// An empty space; the axes' names are `x`, `y`, `z`.
+    /// An empty space; the axes' names are `x`, `y`, `z`, and z is up.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), axes: ["x", "y", "z"].map(str::to_owned), ..Self::default() }
+        Self {
+            title: title.into(),
+            axes: ["x", "y", "z"].map(str::to_owned),
+            up: [0.0, 0.0, 1.0],
+            eye: [1.25, 1.25, 1.25],
+            ..Self::default()
+        }
+    }
+
+    /// As cameras have it: x to the right, y down, z forward; seen from above and beside camera 1, looking forward.
+    #[must_use]
+    pub fn of_camera(title: impl Into<String>) -> Self {
+        Self { up: [0.0, -1.0, 0.0], eye: [-0.9, -0.8, -1.5], ..Self::new(title) }
     }
 
     /// Adds a part.

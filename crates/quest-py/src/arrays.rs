@@ -35,6 +35,24 @@ pub(crate) fn points(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Points> {
     }
 }
 
+/// Samples of five points as they came: two numbers a point, or three.
+pub(crate) enum Samples {
+    /// Points on the plane `z = 1`.
+    Image(Vec<[[f64; 2]; 5]>),
+    /// Bearings of any length.
+    Bearings(Vec<[[f64; 3]; 5]>),
+}
+
+/// Samples of the argument `name`, of shape `(B, 5, 2)` or `(B, 5, 3)`.
+pub(crate) fn samples(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Samples> {
+    let array = Real::new(name, given, "real numbers of shape (B, 5, 2) or (B, 5, 3)")?;
+    match *array.array.shape() {
+        [_, 5, 2] => Ok(Samples::Image(array.numbers()?.as_slice()?.as_chunks().0.as_chunks().0.to_vec())),
+        [_, 5, 3] => Ok(Samples::Bearings(array.numbers()?.as_slice()?.as_chunks().0.as_chunks().0.to_vec())),
+        _ => Err(array.mismatch()),
+    }
+}
+
 /// Rows of `D` numbers from the argument `name`.
 pub(crate) fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]>> {
     Real::new(name, given, &format!("real numbers of shape (N, {D})"))?.rows()

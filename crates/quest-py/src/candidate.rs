@@ -51,7 +51,7 @@ fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
 }
 
 /// The same pose with the sign of the quaternion that is shown, so that a pickled copy is equal.
-fn canonical(pose: RelativePose) -> RelativePose {
+pub(crate) fn canonical(pose: RelativePose) -> RelativePose {
     let [w, i, j, k] = pose.wxyz();
     RelativePose { q_21: UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)), ..pose }
 }

@@ -3,6 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
+use quest_core::robust::EstimateError;
 use quest_core::{CameraError, Degeneracy, InputError, MatchError};
 
 create_exception!(
@@ -27,6 +28,12 @@ create_exception!(
 );
 create_exception!(
     quest_pose,
+    NoPose,
+    QuestError,
+    "No pose agrees with more of the matches than chance explains."
+);
+create_exception!(
+    quest_pose,
     BadCamera,
     QuestError,
     "A camera is impossible, or has no viewing ray for a pixel."
@@ -34,7 +41,15 @@ create_exception!(
 
 /// The exception for a set of matches that the core refuses.
 pub(crate) fn input(error: &InputError) -> PyErr {
-    let message = error.to_string();
+    of_input(error, error.to_string())
+}
+
+/// The exception for a set of matches that the core refuses, one of many sets.
+pub(crate) fn sample(index: usize, error: &InputError) -> PyErr {
+    of_input(error, format!("sample {index}, {error}"))
+}
+
+fn of_input(error: &InputError, message: String) -> PyErr {
     match error {
         InputError::Match { source, .. } => match source {
             MatchError::NotFinite { .. } => NotFinite::new_err(message),
@@ -47,6 +62,15 @@ pub(crate) fn input(error: &InputError) -> PyErr {
         InputError::Degenerate { .. } => DegenerateInput::new_err(message),
         InputError::TooManyMatches { .. } => PyMemoryError::new_err(message),
         _ => QuestError::new_err(message),
+    }
+}
+
+/// The exception for an estimate that failed.
+pub(crate) fn estimate(error: &EstimateError) -> PyErr {
+    match error {
+        EstimateError::Input(error) => input(error),
+        EstimateError::NoPose { .. } => NoPose::new_err(error.to_string()),
+        _ => QuestError::new_err(error.to_string()),
     }
 }
 

@@ -5,7 +5,11 @@ mod arrays;
 mod camera;
 mod candidate;
 mod errors;
+mod estimate;
+mod estimate_batch;
+mod servo;
 mod solve;
+mod solve_batch;
 
 use pyo3::pymodule;
 
@@ -19,9 +23,20 @@ mod _core {
     #[pymodule_export]
     use crate::candidate::{_candidate, Candidate};
     #[pymodule_export]
-    use crate::errors::{BadCamera, DegenerateInput, NotFinite, QuestError, ShapeMismatch, TooFewMatches};
+    use crate::errors::{
+        BadCamera, DegenerateInput, NoPose, NotFinite, QuestError, ShapeMismatch, TooFewMatches,
+    };
+    #[pymodule_export]
+    use crate::estimate::{_estimate, _runner_up, Estimate, RunnerUp, estimate};
+    #[pymodule_export]
+    use crate::estimate_batch::{_estimate_batch, EstimateBatch, estimate_batch};
+    #[pymodule_export]
+    use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
+
+    #[pymodule_export]
+    use crate::solve_batch::_solve_batch;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

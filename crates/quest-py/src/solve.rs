@@ -125,7 +125,7 @@ pub(crate) fn _solvers() -> Vec<(&'static str, usize, usize, &'static str)> {
     infos.iter().map(|i| (i.name, i.min_matches, i.max_candidates, i.reference)).collect()
 }
 
-fn solver_named(name: Option<&str>) -> PyResult<SolverName> {
+pub(crate) fn solver_named(name: Option<&str>) -> PyResult<SolverName> {
     name.map_or(Ok(SolverName::default()), str::parse).map_err(|error| QuestError::new_err(error.to_string()))
 }
 
@@ -138,14 +138,14 @@ fn kinds_named(name: &str) -> PyResult<Kinds> {
 }
 
 /// Two views of the same points, of the right shapes.
-enum Views {
+pub(crate) enum Views {
     Image(Vec<[f64; 2]>, Vec<[f64; 2]>),
     Pixels(Box<[Camera; 2]>, Vec<[f64; 2]>, Vec<[f64; 2]>),
     Bearings(Vec<[f64; 3]>, Vec<[f64; 3]>),
 }
 
 impl Views {
-    fn new(
+    pub(crate) fn new(
         x1: &Bound<'_, PyAny>,
         x2: &Bound<'_, PyAny>,
         camera1: Option<&Bound<'_, PyAny>>,
@@ -174,7 +174,15 @@ impl Views {
         }
     }
 
-    fn matches(&self) -> Result<Vec<Correspondence>, InputError> {
+    /// The cameras, where there are any.
+    pub(crate) fn cameras(&self) -> Option<&[Camera; 2]> {
+        match self {
+            Self::Pixels(cameras, ..) => Some(cameras),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn matches(&self) -> Result<Vec<Correspondence>, InputError> {
         match self {
             Self::Image(x1, x2) => correspondence::from_image_points(x1, x2),
             Self::Pixels(cameras, u1, u2) => correspondence::from_pixels(&cameras[0], u1, &cameras[1], u2),

@@ -13,12 +13,12 @@ const SEED_AGREEMENT: u64 = 104;
 /// Scenes of which `quest` finds four of eight real solutions, all of them well apart: an open fault.
 const INCOMPLETE: [(View, usize); 1] = [(View::InBothImages, 18_698)];
 
-#[test]
-fn quest_and_quest_eigen_find_the_same_solutions() {
-    let mut solutions = 0;
-    let mut differ = Vec::new();
+/// The scenes, of `count` with each view, of which `quest` and `quest-eigen` have different real solutions, to 1e-7 rad; and
+/// how many solutions there are.
+fn differences(count: usize) -> (Vec<(View, usize)>, usize) {
+    let (mut differ, mut solutions) = (Vec::new(), 0);
     for options in [SceneOptions::default(), SceneOptions::realistic()] {
-        for (index, scene) in scenes(noisy(options), SEED_AGREEMENT, 20_000).enumerate() {
+        for (index, scene) in scenes(noisy(options), SEED_AGREEMENT, count as u64).enumerate() {
             let [a, b] = [SolverName::Quest, SolverName::QuestEigen]
                 .map(|solver| exact_rotations(&solve(solver, Kinds::Exact, &scene.matches)));
             solutions += a.len();
@@ -28,20 +28,33 @@ fn quest_and_quest_eigen_find_the_same_solutions() {
             }
         }
     }
+    (differ, solutions)
+}
+
+#[test]
+fn quest_and_quest_eigen_find_the_same_solutions() {
+    let (mut differ, solutions) = differences(20_000);
     differ.retain(|scene| !INCOMPLETE.contains(scene));
     assert_eq!(differ, []);
     // About nine real solutions a problem.
     assert!(solutions > 350_000, "{solutions}");
 }
 
+#[test]
+#[ignore = "a hundred thousand problems: a minute"]
+fn quest_and_quest_eigen_differ_in_no_more_than_a_few_of_a_hundred_thousand() {
+    let (differ, solutions) = differences(50_000);
+    println!("{} of 100,000 problems, {solutions} solutions: {differ:?}", differ.len());
+    assert!(differ.len() <= 5);
+}
+
 /// The five-point solvers that return the real solutions, and of how many of 10,000 problems each may find others than the
-/// rest do: those with nearly double solutions, of which rounding makes a complex pair, and for solvers that do not refine
-/// theirs those that it moves by more than [`SAME`](super::SAME). About twice what was found.
+/// rest do: those with nearly double solutions, of which rounding makes a complex pair. About twice what was found.
 const EXACT: [(SolverName, usize); 8] = [
     (SolverName::Quest, 2),
     (SolverName::QuestEigen, 0),
     (SolverName::Relinearization, 0),
-    (SolverName::Nister, 80),
+    (SolverName::Nister, 0),
     (SolverName::Stewenius, 0),
     (SolverName::LiHartley, 0),
     (SolverName::Kukelova, 0),

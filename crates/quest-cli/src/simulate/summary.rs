@@ -43,7 +43,8 @@ fn errors(run: &Run, figure: Figure, records: &[&Record]) -> String {
     let cells = figure.cells(&run.base);
     let last = cells.last().map_or(0.0, |cell| cell.x);
     let unit = if figure.varies_parallax() { "" } else { " px" };
-    let header = |part: f64| format!("{}{unit}", part * last);
+    // 0.01, not 0.010000000000000002.
+    let header = |part: f64| format!("{}{unit}", (1e6 * part * last).round() / 1e6);
     let [a, b, c, d, e] = SHOWN.map(header);
     let mut table: Table =
         table::empty(["solver", &a, &b, &c, &d, &e, "lowest\nor within 2 %", "no\ncandidate"]);

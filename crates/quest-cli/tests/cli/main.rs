@@ -3,10 +3,13 @@
 
 mod bad_input;
 mod candidates;
+mod estimate;
 mod formats;
 mod output;
 mod readme;
+mod servo;
 mod simulate;
+mod view;
 
 use std::{
     fs,

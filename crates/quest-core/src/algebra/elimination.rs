@@ -17,7 +17,7 @@ pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep
         if size == 0.0 || size.is_nan() {
             return 0.0;
         }
-        a.swap(k, pivot);
+        swap_rows(a, k, pivot);
         let inverse = 1.0 / a[k][k];
         for x in &mut a[k][k + 1..] {
             *x *= inverse;
@@ -88,6 +88,17 @@ pub(crate) fn determinant<const N: usize>(a: &mut [[f64; N]; N]) -> f64 {
         }
     }
     product
+}
+
+/// Exchanges two rows, the second not above the first, entry by entry: three calls to copy memory take as long as a row of the
+/// elimination.
+#[inline]
+fn swap_rows<const R: usize, const C: usize>(a: &mut [[f64; C]; R], i: usize, j: usize) {
+    if let Some((other, rest)) = a[i..=j].split_last_mut() {
+        if let Some(row) = rest.first_mut() {
+            row.swap_with_slice(other);
+        }
+    }
 }
 
 /// The null vector of a singular square matrix, scaled so that its last entry is one; `None` where the matrix

@@ -1,8 +1,9 @@
-//! Small dense linear algebra and polynomials of fixed size, without heap; imports nothing of the crate.
+//! Small dense linear algebra and polynomials, without heap; imports nothing of the crate.
 //!
 //! Each routine stands here because a library's, at these sizes, costs several times as much (ARCHITECTURE.md
 //! has the measurements); the tests hold it against the library's.
 
+pub(crate) mod cholesky;
 pub(crate) mod eigenvalues;
 pub(crate) mod elimination;
 
@@ -10,4 +11,6 @@ pub(crate) mod monomials;
 pub(crate) mod null_space;
 pub(crate) mod polynomial;
 pub(crate) mod singular;
+pub(crate) mod square_root;
 pub(crate) mod symmetric;
+pub(crate) mod two;

@@ -48,11 +48,12 @@ pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
 /// Applies `I − v vᵀ · inverse`.
 #[inline]
 fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64) {
-    let mut dot = 0.0;
+    // Two sums, so that the additions need not wait for each other.
+    let mut sums = [0.0; 2];
     for j in 0..C {
-        dot += v[j] * x[j];
+        sums[j % 2] += v[j] * x[j];
     }
-    dot *= inverse;
+    let dot = (sums[0] + sums[1]) * inverse;
     for j in 0..C {
         x[j] -= dot * v[j];
     }

@@ -7,8 +7,13 @@
 
 use nalgebra::Complex;
 
+use super::square_root::SquareRoot;
+
 /// Where bisection gives up on telling two roots apart, in halvings of an interval.
 const MAX_DEPTH: u32 = 45;
+
+/// Steps to refine a root; seven are usual.
+const MAX_STEPS: usize = 80;
 
 /// Where the line is first divided. None of these is a likely root, as zero is where a basis vector is itself a
 /// solution: there rounding decides the sign.
@@ -33,35 +38,113 @@ impl<const N: usize> RealRoots<N> {
     pub(crate) fn as_slice(&self) -> &[f64] {
         &self.values[..self.len]
     }
-
-    fn push(&mut self, root: f64) {
-        if self.len < N {
-            self.values[self.len] = root;
-            self.len += 1;
-        }
-    }
 }
 
 /// All real roots of `p`, in increasing order.
 pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {
-    let mut roots = RealRoots { values: [0.0; N], len: 0, certain: true, close: false };
     let Some(chain) = Chain::new(p) else {
-        roots.certain = false;
-        return roots;
+        return RealRoots { values: [0.0; N], len: 0, certain: false, close: false };
     };
-    roots.close = chain.is_nearly_double();
+    let mut brackets = Brackets { items: [Bracket::default(); N], len: 0, certain: true };
     let ends = SPLITS.map(|x| End { x, changes: chain.sign_changes(x) });
     let [first, .., last] = ends;
     if let Some(below) = chain.bound(-1.0, first) {
-        chain.isolate(below, first, MAX_DEPTH, &mut roots);
+        chain.isolate(below, first, MAX_DEPTH, &mut brackets);
     }
     for pair in ends.windows(2) {
-        chain.isolate(pair[0], pair[1], MAX_DEPTH, &mut roots);
+        chain.isolate(pair[0], pair[1], MAX_DEPTH, &mut brackets);
     }
     if let Some(above) = chain.bound(1.0, last) {
-        chain.isolate(last, above, MAX_DEPTH, &mut roots);
+        chain.isolate(last, above, MAX_DEPTH, &mut brackets);
     }
-    roots
+    RealRoots { close: chain.is_nearly_double(), ..brackets.refined(&chain.p) }
+}
+
+/// An interval with one root.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bracket {
+    low: f64,
+    high: f64,
+    /// The best estimate.
+    x: f64,
+    /// Whether the polynomial is negative at `low`.
+    negative_below: bool,
+    is_refined: bool,
+}
+
+/// The intervals of all roots.
+struct Brackets<const N: usize> {
+    items: [Bracket; N],
+    len: usize,
+    certain: bool,
+}
+
+impl<const N: usize> Brackets<N> {
+    fn push(&mut self, bracket: Bracket) {
+        if let Some(place) = self.items.get_mut(self.len) {
+            *place = bracket;
+            self.len += 1;
+        }
+    }
+
+    /// The roots: Newton's iteration, bisection where it would leave the bracket.
+    ///
+    /// A step of each in turn: the steps of one root wait for each other, those of different roots do not.
+    fn refined(mut self, p: &[f64; N]) -> RealRoots<N> {
+        for _ in 0..MAX_STEPS {
+            let mut is_done = true;
+            for bracket in &mut self.items[..self.len] {
+                if !bracket.is_refined {
+                    bracket.step(p);
+                    is_done = false;
+                }
+            }
+            if is_done {
+                break;
+            }
+        }
+        let values = self.items.map(|bracket| bracket.x);
+        RealRoots { values, len: self.len, certain: self.certain, close: false }
+    }
+}
+
+impl Bracket {
+    /// `None` where there is no root, rounding having decided a count.
+    fn new<const N: usize>(p: &[f64; N], low: f64, high: f64) -> Option<Self> {
+        let negative_below = value(p, low) < 0.0;
+        let x = 0.5 * (low + high);
+        (negative_below != (value(p, high) < 0.0)).then_some(Self {
+            low,
+            high,
+            x,
+            negative_below,
+            is_refined: false,
+        })
+    }
+
+    #[inline]
+    fn step<const N: usize>(&mut self, p: &[f64; N]) {
+        let (value, slope) = value_and_slope(p, self.x);
+        if (value < 0.0) == self.negative_below {
+            self.low = self.x;
+        } else {
+            self.high = self.x;
+        }
+        let newton = self.x - value / slope;
+        let inside = newton > self.low && newton < self.high;
+        let next = if inside { newton } else { 0.5 * (self.low + self.high) };
+        let moved = (next - self.x).abs();
+        self.x = next;
+        // Convergence is quadratic: a step of a third of the digits leaves a third, the last one none.
+        if moved <= 1e-5 * (1e-3 + next.abs()) {
+            let (value, slope) = value_and_slope(p, next);
+            let last = next - value / slope;
+            if (last - next).abs() <= moved {
+                self.x = last;
+            }
+            self.is_refined = true;
+        }
+    }
 }
 
 /// An end of an interval with the sign changes of the chain there.
@@ -161,57 +244,33 @@ impl<const N: usize> Chain<N> {
         (bound.changes != end.changes).then_some(bound)
     }
 
-    fn isolate(&self, from: End, to: End, depth: u32, roots: &mut RealRoots<N>) {
+    fn isolate(&self, from: End, to: End, depth: u32, brackets: &mut Brackets<N>) {
         let count = from.changes.saturating_sub(to.changes);
         match count {
             0 => {}
-            1 => match self.refine(from.x, to.x) {
-                Some(root) => roots.push(root),
-                None => roots.certain = false,
+            1 => match Bracket::new(&self.p, from.x, to.x) {
+                Some(bracket) => brackets.push(bracket),
+                None => brackets.certain = false,
             },
             _ if depth == 0 => {
-                roots.certain = false;
+                brackets.certain = false;
                 for _ in 0..count {
-                    roots.push(0.5 * (from.x + to.x));
+                    let x = 0.5 * (from.x + to.x);
+                    brackets.push(Bracket { x, is_refined: true, ..Bracket::default() });
                 }
             }
             _ => {
                 let x = 0.5 * (from.x + to.x);
                 let middle = End { x, changes: self.sign_changes(x) };
-                self.isolate(from, middle, depth - 1, roots);
-                self.isolate(middle, to, depth - 1, roots);
+                self.isolate(from, middle, depth - 1, brackets);
+                self.isolate(middle, to, depth - 1, brackets);
             }
         }
     }
+}
 
-    /// The one root in an interval: Newton's iteration, bisection where it would leave the bracket.
-    /// `None` where there is none, rounding having decided a count.
-    fn refine(&self, mut low: f64, mut high: f64) -> Option<f64> {
-        let negative_below = value_and_slope(&self.p, low).0 < 0.0;
-        if negative_below == (value_and_slope(&self.p, high).0 < 0.0) {
-            return None;
-        }
-        let mut x = 0.5 * (low + high);
-        for _ in 0..80 {
-            let (value, slope) = value_and_slope(&self.p, x);
-            if (value < 0.0) == negative_below {
-                low = x;
-            } else {
-                high = x;
-            }
-            let newton = x - value / slope;
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            let moved = (next - x).abs();
-            x = next;
-            // Convergence is quadratic: a step of half the digits leaves none.
-            if moved <= 1e-9 * (1e-3 + x.abs()) {
-                let (value, slope) = value_and_slope(&self.p, x);
-                let last = x - value / slope;
-                return Some(if last.is_finite() && (last - x).abs() <= moved { last } else { x });
-            }
-        }
-        Some(x)
-    }
+fn value<const N: usize>(p: &[f64; N], x: f64) -> f64 {
+    p[..N - 1].iter().rev().fold(p[N - 1], |value, c| value * x + c)
 }
 
 fn value_and_slope<const N: usize>(p: &[f64; N], x: f64) -> (f64, f64) {
@@ -305,7 +364,7 @@ fn laguerre(p: &[f64]) -> Option<Complex<f64>> {
         let g = d / f;
         let g2 = g * g;
         let curvature = g2 - 2.0 * h / f;
-        let root = ((degree * curvature - g2) * (degree - 1.0)).sqrt();
+        let root = ((degree * curvature - g2) * (degree - 1.0)).square_root();
         let (plus, minus) = (g + root, g - root);
         let denominator = if plus.norm_sqr() > minus.norm_sqr() { plus } else { minus };
         let step = degree / denominator;

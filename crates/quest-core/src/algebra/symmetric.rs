@@ -8,6 +8,9 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 /// Enough for a double root, where the convergence is linear.
 const MAX_STEPS: usize = 60;
 
+/// Sweeps of Jacobi's rotations; a matrix that is not finite takes them all.
+const MAX_SWEEPS: usize = 10;
+
 /// The root that Newton's iteration reaches from `below`, for `f(x) = (value, derivative)`.
 fn smallest_root(below: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut x = below;
@@ -63,6 +66,41 @@ pub(crate) fn smallest_eigenvector_4(m: &Matrix4<f64>, below: f64) -> Option<Vec
     let adjugate = adjugate(&shifted);
     let longest = longest(&std::array::from_fn::<_, 4, _>(|k| adjugate.column(k).norm_squared()))?;
     Some(adjugate.column(longest).normalize())
+}
+
+/// Eigenvalues, largest first, and unit eigenvectors of a symmetric matrix, by Jacobi's rotations: exact to the rounding of the
+/// matrix however close the eigenvalues are.
+pub(crate) fn eigen_3(m: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
+    let mut m = *m;
+    let mut v = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let negligible = f64::EPSILON * m.norm();
+    // Convergence is quadratic: three or four sweeps.
+    for _ in 0..MAX_SWEEPS {
+        let [xy, xz, yz] = [m[(0, 1)], m[(0, 2)], m[(1, 2)]];
+        if xy.abs().max(xz.abs()).max(yz.abs()) <= negligible {
+            break;
+        }
+        for (i, j, k) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+            let off = m[(i, j)];
+            if off == 0.0 {
+                continue;
+            }
+            let half = 0.5 * (m[(j, j)] - m[(i, i)]);
+            // The smaller of the two tangents that annihilate the entry.
+            let t = off / (half + (half * half + off * off).sqrt().copysign(half));
+            let c = 1.0 / (1.0 + t * t).sqrt();
+            let s = t * c;
+            m[(i, i)] -= t * off;
+            m[(j, j)] += t * off;
+            (m[(i, j)], m[(j, i)]) = (0.0, 0.0);
+            let (ik, jk) = (c * m[(i, k)] - s * m[(j, k)], s * m[(i, k)] + c * m[(j, k)]);
+            (m[(i, k)], m[(k, i)], m[(j, k)], m[(k, j)]) = (ik, ik, jk, jk);
+            (v[i], v[j]) = (v[i] * c - v[j] * s, v[i] * s + v[j] * c);
+        }
+    }
+    let mut order = [0, 1, 2];
+    order.sort_unstable_by(|&i, &j| m[(j, j)].total_cmp(&m[(i, i)]));
+    (order.map(|k| m[(k, k)]), order.map(|k| v[k]))
 }
 
 /// The index of the largest entry, where it is positive.
@@ -151,6 +189,23 @@ mod tests {
             let gap = (values[1] - values[0]) / m.trace();
             let found = smallest_eigenvector_3(&m).unwrap();
             assert!(1.0 - found.dot(&expected).abs() < 1e-13 / gap.powi(4), "gap {gap:e}");
+        }
+    }
+
+    #[test]
+    fn jacobi_diagonalises_also_equal_eigenvalues() {
+        let mut rng = ChaCha8Rng::seed_from_u64(14);
+        for round in 0..1000 {
+            let b = Matrix3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let gap = [1.0, 1e-9, 0.0][round % 3];
+            let m = b.qr().q();
+            let m = m * Matrix3::from_diagonal(&Vector3::new(2.0 + gap, 2.0, 0.5)) * m.transpose();
+            let m = if round % 2 == 0 { (m + m.transpose()) * 0.5 } else { b + b.transpose() };
+            let (values, vectors) = eigen_3(&m);
+            let v = Matrix3::from_columns(&vectors);
+            assert!((v.transpose() * v - Matrix3::identity()).norm() < 1e-14);
+            assert!((m * v - v * Matrix3::from_diagonal(&values.into())).norm() < 1e-14);
+            assert!(values[0] >= values[1] && values[1] >= values[2]);
         }
     }
 

@@ -246,7 +246,7 @@ fn solve_group<L: WordLanes>(
     let b = load(lanes, &bearings[1]);
     let (frame, mut rows) = frame(lanes, &a, &b);
     let (basis, independence) = null_space(lanes, &mut rows);
-    let (reduced, pivot) = reduce(lanes, &mut cubics(lanes, &basis, frame.parallax));
+    let (reduced, pivot) = reduce(lanes, &cubics(lanes, &basis, frame.parallax));
     let resultant = Resultant::<L>::new(lanes, &reduced);
     let polynomial = resultant.polynomial(lanes);
     let mirrored = roots::mirrored::<L>(&polynomial);

@@ -5,6 +5,9 @@ use std::ops::Range;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::solver::essential::{decompose, twisted};
+use crate::solver::shortlist::rank;
+use crate::structure::with_depths;
+use crate::{Candidate, CandidateKind, Candidates, Correspondence};
 
 /// The essential matrices of many samples, in structure of arrays.
 ///
@@ -82,6 +85,20 @@ impl Essentials {
         let (q, t) = decompose(&[[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]])?;
         let unit = |[w, x, y, z]: [f64; 4]| UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
         Some(([unit(q), unit(twisted(&q, &t))], Vector3::from(t).normalize()))
+    }
+
+    /// Fills `out` with both poses of each essential matrix of a sample, given its matches: what a solver returns for them with
+    /// [`Kinds::Exact`](crate::solver::Kinds::Exact), in the same order.
+    pub fn candidates(&self, sample: usize, matches: &[Correspondence], out: &mut Candidates) {
+        out.clear();
+        for (rotations, direction) in self.of(sample).filter_map(|k| self.motions(k)) {
+            for q_21 in rotations {
+                let found = with_depths(q_21, &direction, matches);
+                let (kind, pose) = (CandidateKind::Exact, found.pose);
+                out.push(Candidate { kind, pose, residual: found.residual, in_front: found.in_front });
+            }
+        }
+        rank(out);
     }
 
     /// Appends the essential matrices of one more sample.

@@ -3,11 +3,13 @@
 #[cfg(target_arch = "x86_64")]
 use pulp::{
     Simd, WithSimd,
-    x86::{V3, V4},
+    x86::{V1, V3, V4},
 };
 
 use super::lane::{Lanes, WordLanes};
 use super::portable::Portable;
+#[cfg(target_arch = "x86_64")]
+use super::sse2::Sse2;
 #[cfg(target_arch = "x86_64")]
 use super::vector::Vector;
 
@@ -19,6 +21,8 @@ use super::vector::Vector;
 pub enum Instructions {
     /// What every processor of the target has, as the compiler uses it.
     Portable,
+    /// x86: SSE2, two lanes of `f64`. Every x86-64 has it.
+    Sse2,
     /// x86: AVX2 with FMA, four lanes of `f64`.
     Avx2,
     /// x86: AVX-512, eight lanes of `f64`.
@@ -27,7 +31,7 @@ pub enum Instructions {
 
 impl Instructions {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+    pub const ALL: [Self; 4] = [Self::Portable, Self::Sse2, Self::Avx2, Self::Avx512];
 
     /// The fastest that this processor has.
     #[must_use]
@@ -64,6 +68,8 @@ pub enum Token {
     /// None in particular.
     Portable,
     #[cfg(target_arch = "x86_64")]
+    Sse2(V1),
+    #[cfg(target_arch = "x86_64")]
     Avx2(V3),
     #[cfg(target_arch = "x86_64")]
     Avx512(V4),
@@ -74,6 +80,8 @@ impl Token {
     pub(super) fn new(instructions: Instructions) -> Option<Self> {
         match instructions {
             Instructions::Portable => Some(Self::Portable),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Sse2 => V1::try_new().map(Self::Sse2),
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => V3::try_new().map(Self::Avx2),
             #[cfg(target_arch = "x86_64")]
@@ -94,6 +102,8 @@ impl Token {
         match self {
             Self::Portable => task.run(Portable::<2>),
             #[cfg(target_arch = "x86_64")]
+            Self::Sse2(simd) => task.run(Sse2(simd)),
+            #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => Simd::vectorize(simd, Adapter(task)),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512(simd) => Simd::vectorize(simd, Adapter(task)),
@@ -104,6 +114,8 @@ impl Token {
     pub(super) fn instructions(self) -> Instructions {
         match self {
             Self::Portable => Instructions::Portable,
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse2(_) => Instructions::Sse2,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => Instructions::Avx2,
             #[cfg(target_arch = "x86_64")]

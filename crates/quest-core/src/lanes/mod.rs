@@ -42,6 +42,8 @@ mod portable;
 mod resultant;
 mod roots;
 mod score;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
 #[cfg(test)]
 mod test;
 #[cfg(target_arch = "x86_64")]

@@ -127,7 +127,7 @@ fn solve<L: Lanes<f64>>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> [F<L>; 5] {
         let image = (-length).select(zero.less(m[k][k]), length);
         m[k][k] = m[k][k] - image;
         inverse[k] = one / image;
-        let factor = -(inverse[k] / m[k][k]);
+        let factor = -one / (image * m[k][k]);
         for j in k + 1..6 {
             let mut dot = m[k][k] * m[k][j];
             for i in k + 1..5 {

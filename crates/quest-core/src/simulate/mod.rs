@@ -15,6 +15,7 @@ mod camera;
 mod experiment;
 mod metrics;
 mod options;
+mod outliers;
 mod sampling;
 mod scene;
 mod selection;

@@ -1,9 +1,11 @@
 //! Errors of candidates: the smallest there are, or those of one chosen without the truth.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use nalgebra::Vector3;
 
 use super::{View, rotation_metric, translation_metric};
-use crate::{Candidate, Correspondence, RelativePose};
+use crate::{Candidate, Correspondence, RelativePose, pose::sampson_square};
 
 /// The errors of one pose by the paper's metrics, in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,20 +55,41 @@ pub fn choose<'a>(
     others: &[Correspondence],
     view: View,
 ) -> Option<&'a Candidate> {
-    let costs = candidates.into_iter().map(|c| (c, cost(&c.pose, others, view)));
-    costs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
+    let mut best = (None, f64::INFINITY);
+    for candidate in candidates {
+        let cost = cost(&candidate.pose, others, view, best.1);
+        if cost < best.1 {
+            best = (Some(candidate), cost);
+        }
+    }
+    best.0
 }
 
-fn cost(pose: &RelativePose, others: &[Correspondence], view: View) -> f64 {
-    let rotation = RelativePose::new(pose.q_21, Vector3::zeros());
+/// The sum of the errors, or something above `limit` as soon as it is known to exceed it.
+fn cost(pose: &RelativePose, others: &[Correspondence], view: View, limit: f64) -> f64 {
+    let r_21 = pose.r_21();
+    let t = pose.t_21.try_normalize(0.0);
     // With t, and with −t.
     let mut sums = [0.0, 0.0];
     for m in others {
-        let at_infinity = rotation.sampson_error(m);
-        let at_depth = pose.sampson_error(m);
-        let (z1, z2) = pose.depths(m).unwrap_or((-1.0, 1.0));
-        sums[0] += if z1 > 0.0 && z2 > 0.0 { at_depth } else { at_infinity };
-        sums[1] += if z1 < 0.0 && z2 < 0.0 { at_depth } else { at_infinity };
+        let (b, c) = (m.bearing2(), r_21 * m.bearing1());
+        let n = b.cross(&c);
+        let at_infinity = || FRAC_1_SQRT_2 * n.norm().atan2(b.dot(&c));
+        let error = |t: Vector3<f64>| {
+            let at_depth = sampson_square(t.dot(&n), t.dot(b), t.dot(&c)).sqrt();
+            // The signs of the depths: (28) crossed with b, and with c.
+            match (b.cross(&t).dot(&n) < 0.0, c.cross(&t).dot(&n) < 0.0) {
+                (true, true) => [at_depth, at_infinity()],
+                (false, false) => [at_infinity(), at_depth],
+                _ => [at_infinity(); 2],
+            }
+        };
+        let [with_t, reversed] = t.map_or_else(|| [at_infinity(); 2], error);
+        sums[0] += with_t;
+        sums[1] += reversed;
+        if sums[0] > limit && (view == View::InBothImages || sums[1] > limit) {
+            return f64::INFINITY;
+        }
     }
     if view == View::Everywhere { sums[0].min(sums[1]) } else { sums[0] }
 }

@@ -12,18 +12,18 @@
 //! parallax, and so are `t` and `S` at the true motion: `R = R0` to first order in `p`, so that the symmetric part of
 //! `E = [t]× R R0ᵀ` is of order `p`.
 
-use nalgebra::{
-    ComplexField, Matrix3, Matrix5, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector3, Vector5,
-};
+use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
 
-use super::motion::Motion;
 use crate::algebra::null_space::null_space;
-use crate::alignment::{best_rotation, best_rotation_of_lines};
+use crate::alignment::{best_rotation, best_rotation_of_lines, nearly_best_rotation};
 use crate::degeneracy::diagnose;
 use crate::{Correspondence, Degeneracy};
 
 /// Bearings closer to aligned than this (root mean square of the sine) are a pure rotation to rounding.
 const NO_PARALLAX: f64 = 1e-13;
+
+/// With more parallax than this the last digits of the alignment do not matter: any rotation near it serves.
+const LARGE_PARALLAX: f64 = 1e-3;
 
 /// Constraints closer to dependent than this have no reliable solution: the smallest pivot of the
 /// rows is at most 1e-15 for collinear, coincident and repeated points, and above 1e-4 for ordinary ones.
@@ -46,7 +46,12 @@ pub(crate) struct Alignment {
 
 impl Alignment {
     pub(crate) fn new(matches: &[Correspondence]) -> Self {
-        let rays = Self::with_rotation(best_rotation(matches), matches);
+        let nearly = Self::with_rotation(nearly_best_rotation(matches), matches);
+        let rays = if nearly.parallax > LARGE_PARALLAX {
+            nearly
+        } else {
+            Self::with_rotation(best_rotation(matches), matches)
+        };
         // Bearings in a plane are aligned as lines just as well by another half turn: rounding must not choose that.
         if rays.is_pure_rotation() {
             return rays;
@@ -94,14 +99,14 @@ impl Alignment {
     }
 
     /// The bearing of camera 1 in the aligned frame.
-    fn turned(&self) -> impl Fn(&Correspondence) -> Vector3<f64> {
+    pub(crate) fn turned(&self) -> impl Fn(&Correspondence) -> Vector3<f64> {
         let r0_21 = self.q0_21.to_rotation_matrix();
         move |m| r0_21 * m.bearing1()
     }
 
     /// The row of a match.
     #[inline]
-    fn row(&self, b: &Vector3<f64>, c: &Vector3<f64>) -> Coordinates {
+    pub(crate) fn row(&self, b: &Vector3<f64>, c: &Vector3<f64>) -> Coordinates {
         let b = same_side(b, c);
         let n = moment(&b, c) / self.parallax;
         [
@@ -133,9 +138,14 @@ impl Alignment {
         [[xx, xy - tz, xz + ty], [xy + tz, yy, yz - tx], [xz - ty, yz + tx, zz]]
     }
 
-    /// The coordinates of an essential matrix between view 1 and view 2.
-    fn coordinates(&self, e: &Matrix3<f64>) -> Coordinates {
-        let e = e * self.q0_21.to_rotation_matrix().into_inner().transpose();
+    /// The rotation that is left of `q_21` after the alignment.
+    pub(crate) fn after_alignment(&self, q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
+        (q_21 * self.q0_21.inverse()).to_rotation_matrix().into_inner()
+    }
+
+    /// The coordinates of an essential matrix between the turned view 1 and view 2.
+    #[inline]
+    pub(crate) fn coordinates(&self, e: &Matrix3<f64>) -> Coordinates {
         let (half, over_p) = (0.5, 1.0 / self.parallax);
         [
             half * (e[(2, 1)] - e[(1, 2)]),
@@ -170,62 +180,4 @@ fn same_side(b: &Vector3<f64>, c: &Vector3<f64>) -> Vector3<f64> {
 #[inline]
 fn moment(b: &Vector3<f64>, c: &Vector3<f64>) -> Vector3<f64> {
     c.cross(&(b - c))
-}
-
-/// `Σ y yᵀ` over the rows `y` of any number of matches: the summed squares of their constraints are a quadratic form in the
-/// coordinates of the essential matrix.
-#[derive(Clone, Debug)]
-pub(crate) struct Gram<'a> {
-    alignment: &'a Alignment,
-    sum: SMatrix<f64, 9, 9>,
-}
-
-impl<'a> Gram<'a> {
-    pub(crate) fn new(alignment: &'a Alignment, matches: &[Correspondence]) -> Self {
-        let turned = alignment.turned();
-        let mut lower = [[0.0; 9]; 9];
-        for m in matches {
-            let y = alignment.row(m.bearing2(), &turned(m));
-            for i in 0..9 {
-                for j in 0..=i {
-                    lower[i][j] += y[i] * y[j];
-                }
-            }
-        }
-        Self { alignment, sum: SMatrix::from_fn(|i, j| lower[i.max(j)][i.min(j)]) }
-    }
-
-    /// An orthonormal basis of the nine coordinates, those that the matches constrain most first: the first five
-    /// stand for the constraints of all matches, the last four span the essential matrices that fit them best.
-    pub(crate) fn principal_basis(&self, matches: &[Correspondence]) -> Result<[Coordinates; 9], Degeneracy> {
-        let eigen = SymmetricEigen::new(self.sum);
-        let mut order = [0, 1, 2, 3, 4, 5, 6, 7, 8];
-        order.sort_unstable_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-        if eigen.eigenvalues[order[4]] < GRAM_DEPENDENT * eigen.eigenvalues[order[0]] {
-            return Err(diagnose(matches));
-        }
-        Ok(order.map(|k| std::array::from_fn(|i| eigen.eigenvectors[(i, k)])))
-    }
-
-    /// The summed squares of the constraints at a motion.
-    pub(crate) fn cost(&self, motion: &Motion) -> f64 {
-        let e = SVector::from(self.alignment.coordinates(&motion.essential()));
-        e.dot(&(self.sum * e))
-    }
-
-    /// The normal equations of a Gauss–Newton step in the parameters of [`Motion`].
-    pub(crate) fn normal_equations(
-        &self,
-        motion: &Motion,
-        tangent: &[Vector3<f64>; 2],
-    ) -> (Matrix5<f64>, Vector5<f64>) {
-        let e = SVector::from(self.alignment.coordinates(&motion.essential()));
-        let derivatives = motion.essential_derivatives(tangent);
-        let mut jacobian = SMatrix::<f64, 9, 5>::zeros();
-        for (mut column, derivative) in jacobian.column_iter_mut().zip(&derivatives) {
-            column.copy_from(&SVector::from(self.alignment.coordinates(derivative)));
-        }
-        let weighted = self.sum * jacobian;
-        (jacobian.tr_mul(&weighted), weighted.tr_mul(&e))
-    }
 }

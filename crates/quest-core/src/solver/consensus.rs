@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 use super::motion::Motion;
+use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use crate::{CandidateKind, Correspondence};
 
@@ -19,29 +20,19 @@ pub(crate) const AGREEMENT: f64 = 4e-3;
 /// How many fives are tried. With 70 % correct matches one of them is all correct in 99 of 100 cases.
 const FIVES: usize = 24;
 
-/// Adds the motion on which most matches agree, if no motion in the list fits them all. `solve` gives the motions of
-/// five matches.
-pub(crate) fn add(
-    shortlist: &mut Shortlist,
-    matches: &[Correspondence],
-    solve: impl Fn(&[Correspondence; 5]) -> Option<Shortlist>,
-) {
+/// Adds the motion on which most matches agree.
+pub(crate) fn add(shortlist: &mut Shortlist, matches: &[Correspondence]) {
     let cost = |motion: &Motion| motion.truncated_cost(matches, AGREEMENT);
-    let untruncated = |motion: &Motion| motion.truncated_cost(matches, f64::INFINITY);
-    let all_agree = matches.len() as f64 * AGREEMENT * AGREEMENT;
-    if shortlist.iter().any(|(_, motion)| untruncated(motion) < all_agree) {
-        return;
-    }
     // The same fives for the same matches, every time.
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut best: Option<(f64, Motion)> = None;
     for _ in 0..FIVES {
         let Some(indices) = sample_array::<_, 5>(&mut rng, matches.len()) else { return };
         let five = indices.map(|index| matches[index]);
-        for (_, motion) in solve(&five).iter().flat_map(Shortlist::iter) {
-            let cost = cost(motion);
+        for item in motions_of_five(&five).iter().flat_map(Shortlist::iter) {
+            let cost = cost(&item.motion);
             if best.is_none_or(|(smallest, _)| cost < smallest) {
-                best = Some((cost, *motion));
+                best = Some((cost, item.motion));
             }
         }
     }

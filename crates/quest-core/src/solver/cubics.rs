@@ -97,6 +97,23 @@ pub(crate) fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
 }
 
 #[inline]
+fn square(a: &Linear) -> Quadratic {
+    let mut out = [0.0; 10];
+    for i in 0..4 {
+        out[SQUARE[i][i]] = a[i] * a[i];
+        for j in 0..i {
+            out[SQUARE[i][j]] = 2.0 * a[i] * a[j];
+        }
+    }
+    out
+}
+
+#[inline]
+fn sum_of(a: &Quadratic, b: &Quadratic, c: &Quadratic) -> Quadratic {
+    std::array::from_fn(|q| a[q] + b[q] + c[q])
+}
+
+#[inline]
 pub(crate) fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
     for i in 0..10 {
         for j in 0..4 {
@@ -138,11 +155,21 @@ impl Forms {
     fn lambda(&self, p: f64) -> [[Quadratic; 3]; 3] {
         let mut lambda = [[[0.0; 10]; 3]; 3];
         let twice = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, 2.0)));
-        let mut trace = [0.0; 10];
+        let [[xx, xy, xz], [_, yy, yz], [.., zz]] = self.s.each_ref().map(|row| row.each_ref().map(square));
+        let diagonal: [Quadratic; 3] =
+            [[&xx, &xy, &xz], [&xy, &yy, &yz], [&xz, &yz, &zz]].map(|[a, b, c]| sum_of(a, b, c));
+        let trace = sum_of(&diagonal[0], &diagonal[1], &diagonal[2]);
         for i in 0..3 {
-            for j in i..3 {
-                // K S − S K = K S + (K S)ᵀ, and the diagonal of K is zero.
-                let entry = &mut lambda[i][j];
+            // K S − S K = K S + (K S)ᵀ, and the diagonal of K is zero.
+            let entry = &mut lambda[i][i];
+            for m in (0..3).filter(|&m| m != i) {
+                add_linear_product(entry, &self.k[i][m], &twice[m][i]);
+            }
+            for q in 0..10 {
+                entry[q] = 2.0 * entry[q] + p * (2.0 * diagonal[i][q] - trace[q]);
+            }
+            for j in i + 1..3 {
+                let (entry, mut square) = (&mut lambda[i][j], [0.0; 10]);
                 for m in 0..3 {
                     if m != i {
                         add_linear_product(entry, &self.k[i][m], &twice[m][j]);
@@ -150,22 +177,11 @@ impl Forms {
                     if m != j {
                         add_linear_product(entry, &self.k[j][m], &twice[m][i]);
                     }
-                }
-                let mut square = [0.0; 10];
-                for m in 0..3 {
                     add_linear_product(&mut square, &twice[i][m], &self.s[m][j]);
                 }
                 for q in 0..10 {
                     entry[q] += p * square[q];
-                    if i == j {
-                        trace[q] += 0.5 * square[q];
-                    }
                 }
-            }
-        }
-        for i in 0..3 {
-            for q in 0..10 {
-                lambda[i][i][q] -= p * trace[q];
             }
         }
         lambda

@@ -32,10 +32,11 @@ use super::aligned::Alignment;
 use super::essential::decompose;
 use super::five_point::unit;
 use super::least_squares::{null_vector, outer};
-use super::motion::Motion;
+use super::motion::{Motion, tangent_basis};
 use super::normalisation::Normalisation;
 use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, PoseSolver};
+use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::degeneracy::diagnose_fewer_than;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
@@ -80,10 +81,19 @@ fn motion(matches: &[Correspondence]) -> Option<Motion> {
 }
 
 /// The essential matrix with singular values 1, 1, 0 that is nearest to a matrix up to scale.
+///
+/// The last right singular vector is an eigenvector of `Eᵀ E`; on the plane across it `A (AᵀA)^(−½)` sets both other singular
+/// values to one, with the square root of a 2 × 2 matrix in closed form.
 fn nearest_essential(e: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let mut svd = e.svd(true, true);
-    svd.singular_values = Vector3::new(1.0, 1.0, 0.0);
-    svd.recompose().ok()
+    let plane = tangent_basis(&smallest_eigenvector_3(&e.tr_mul(e))?);
+    let [a, b] = plane.map(|v| e * v);
+    let (aa, ab, bb) = (a.norm_squared(), a.dot(&b), b.norm_squared());
+    let determinant = (aa * bb - ab * ab).sqrt();
+    // (S + √det S) / √(tr S + 2 √det S) is the square root of S, and the adjugate over the determinant its inverse.
+    let scale = 1.0 / (determinant * (aa + bb + 2.0 * determinant).sqrt());
+    let (a, b) = ((a * (bb + determinant) - b * ab) * scale, (b * (aa + determinant) - a * ab) * scale);
+    let nearest = a * plane[0].transpose() + b * plane[1].transpose();
+    nearest.iter().all(|x| x.is_finite()).then_some(nearest)
 }
 
 #[cfg(test)]

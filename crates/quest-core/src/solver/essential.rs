@@ -10,6 +10,8 @@
 
 use nalgebra::{Complex, ComplexField};
 
+use crate::algebra::square_root::SquareRoot;
+
 type Vector<T> = [T; 3];
 
 #[inline]
@@ -33,19 +35,19 @@ fn largest<const N: usize>(sizes: &[f64; N]) -> usize {
 ///
 /// `None` for a matrix that is zero or not finite.
 #[inline]
-pub(crate) fn decompose<T: ComplexField<RealField = f64> + Copy>(
+pub(crate) fn decompose<T: ComplexField<RealField = f64> + SquareRoot + Copy>(
     e: &[Vector<T>; 3],
 ) -> Option<([T; 4], Vector<T>)> {
     let mut sum = T::zero();
     for x in e.as_flattened() {
         sum += *x * *x;
     }
-    let scale = (T::from_real(2.0) / sum).sqrt();
+    let scale = (T::from_real(2.0) / sum).square_root();
     let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j] * scale));
     let cofactors: [Vector<T>; 3] =
         std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
     let longest = cofactors[largest(&cofactors.each_ref().map(square_size))];
-    let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt();
+    let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).square_root();
     let inverse = T::one() / length;
     let t = longest.map(|x| x * inverse);
     let r: [Vector<T>; 3] = std::array::from_fn(|j| {
@@ -88,7 +90,7 @@ pub(crate) fn twisted<T: ComplexField + Copy>(q: &[T; 4], t: &Vector<T>) -> [T; 
 /// cameras, unlike the one that makes the largest component real.
 pub(crate) fn real_part(q: [Complex<f64>; 4]) -> [f64; 4] {
     let square: Complex<f64> = q.iter().map(|x| x * x).sum();
-    let phase = square.sqrt().conj();
+    let phase = square.square_root().conj();
     q.map(|x| (x * phase).re)
 }
 

@@ -9,11 +9,11 @@
 //! **Problem.** Rotation and translation from four or more matches of points on one plane.
 //!
 //! **Steps**:
-//! 1. Normalise each view (`normalisation.rs`: for bearings, on a plane `z = 1` or not).
-//! 2. `x2 × H x1 = 0`, of which each match gives the two rows across `x2`. Of eight rows the null vector by orthogonal
-//!    factorisation, of more the direction with the smallest sum of squares, by their Gram matrix.
-//! 3. Undo the normalisation and divide by the middle singular value: `H = R + t nᵀ` up to sign, `n` the normal over the
-//!    distance of the plane.
+//! 1. The homography `x2 ∝ H x1` of four matches in closed form. Each view has a matrix that takes the coordinate axes to
+//!    three of the bearings and `(1, 1, 1)` to the fourth; `H` is that of view 2 times the inverse of that of view 1.
+//! 2. For more: normalise each view (`normalisation.rs`: for bearings, on a plane `z = 1` or not); each match gives the two rows of
+//!    `x2 × H x1 = 0` across `x2`; the direction with the smallest sum of squares, by their Gram matrix; undo the normalisation.
+//! 3. Divide by the middle singular value: `H = R + t nᵀ` up to sign, `n` the normal over the distance of the plane.
 //! 4. With `Hᵀ H = V diag(σ1², 1, σ3²) Vᵀ`, two directions `u` next to `v2` keep their length under `H`, so that the frame
 //!    `v2, u, v2 × u` goes to `H v2, H u, H v2 × H u` by a rotation, with `v2 × u` the normal.
 //! 5. The translation `t = (H − R)(v2 × u)` of each. The sign of `H` is open where points may lie behind a camera:
@@ -33,13 +33,15 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::aligned::Alignment;
+use super::aligned::{Alignment, DEPENDENT};
 use super::least_squares::{null_vector, outer};
-use super::motion::{Motion, tangent_basis};
+use super::motion::Motion;
 use super::normalisation::Normalisation;
 use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, PoseSolver};
+use crate::algebra::symmetric::eigen_3;
 use crate::degeneracy::diagnose_fewer_than;
+use crate::epipolar_frame::tangent_basis;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// The motions of a plane; the steps stand at the head of the module.
@@ -71,6 +73,9 @@ impl PoseSolver for Homography {
 
 /// The matrix `H` with `x2 ∝ H x1`, of any scale; `None` where the matches leave more than one.
 fn homography(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
+    if let Ok(four) = matches.try_into() {
+        return of_four(four);
+    }
     let view1 = Normalisation::new(matches.iter().map(Correspondence::bearing1));
     let view2 = Normalisation::new(matches.iter().map(Correspondence::bearing2));
     let rows = matches.iter().flat_map(|m| {
@@ -80,6 +85,36 @@ fn homography(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
     });
     let normalised = null_vector(2 * matches.len(), rows)?;
     Some(view2.inverse * Matrix3::from_row_slice(&normalised) * view1.transform)
+}
+
+/// The homography of four matches: with `a`, `b` the bearings,
+/// `Σ b_i (a_j × a_k)ᵀ det[b_4 b_j b_k] / det[a_4 a_j a_k]` over the cyclic orders of the first three.
+fn of_four(matches: &[Correspondence; 4]) -> Option<Matrix3<f64>> {
+    let (view1, view2) =
+        (Frame::new(matches.map(|m| *m.bearing1()))?, Frame::new(matches.map(|m| *m.bearing2()))?);
+    let term = |i: usize| view2.axes[i] * view1.across[i].transpose() * (view2.shares[i] / view1.shares[i]);
+    Some(term(0) + term(1) + term(2))
+}
+
+/// Four bearings as a projective frame.
+struct Frame {
+    axes: [Vector3<f64>; 3],
+    /// `a_j × a_k`.
+    across: [Vector3<f64>; 3],
+    /// `det[a_4 a_j a_k]`: the fourth bearing in the basis of the others, times their determinant.
+    shares: [f64; 3],
+}
+
+impl Frame {
+    /// `None` where three of the bearings lie in a plane.
+    fn new([a, b, c, d]: [Vector3<f64>; 4]) -> Option<Self> {
+        let across = [b.cross(&c), c.cross(&a), a.cross(&b)];
+        let shares = across.map(|n| n.dot(&d));
+        let smallest = shares.iter().fold(across[0].dot(&a).abs(), |least, share| least.min(share.abs()));
+        // Areas against the square of the extent.
+        let extent = [b - a, c - a, d - a].iter().fold(0.0_f64, |most, x| most.max(x.norm_squared()));
+        (smallest > DEPENDENT * extent).then_some(Self { axes: [a, b, c], across, shares })
+    }
 }
 
 /// The motions of the plane that explains all matches to `tolerance` (radians), if there is one.
@@ -92,23 +127,19 @@ pub(crate) fn motions_of_plane(matches: &[Correspondence], tolerance: f64) -> [O
     if matches.iter().all(explains) { motions(&h) } else { [None; 2] }
 }
 
-/// A middle singular value this small against the largest one leaves no digit of its direction.
+/// A middle singular value this small against the largest one leaves no digit of its direction: the squares are decomposed.
 const RANK_ONE: f64 = 1e-7;
 
 /// One motion of each of the two essential matrices of a plane; none for a rotation alone.
-fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
-    let svd = h.svd(false, true);
-    let Some(v_t) = svd.v_t else { return [None; 2] };
-    let middle = svd.singular_values[1];
-    // Of rank one, as far as can be told (the squares are decomposed): it takes all points to the same one.
-    if middle <= RANK_ONE * svd.singular_values[0] {
+pub(crate) fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
+    let ([largest, middle, smallest], [v1, v2, v3]) = eigen_3(&h.tr_mul(h));
+    // Of rank one, as far as can be told: it takes all points to the same one.
+    if !(middle > RANK_ONE * RANK_ONE * largest) {
         return [None; 2];
     }
-    let h = h / middle;
-    let [largest, smallest] = [0, 2].map(|k| (svd.singular_values[k] / middle).powi(2));
+    let h = h / middle.sqrt();
     // Rounding may put them on the wrong side of one.
-    let (a, c) = ((1.0 - smallest).max(0.0).sqrt(), (largest - 1.0).max(0.0).sqrt());
-    let [v1, v2, v3]: [Vector3<f64>; 3] = std::array::from_fn(|k| v_t.row(k).transpose());
+    let (a, c) = ((1.0 - smallest / middle).max(0.0).sqrt(), (largest / middle - 1.0).max(0.0).sqrt());
     [c, -c].map(|c| {
         let u = (v1 * a + v3 * c).try_normalize(0.0)?;
         let normal = v2.cross(&u);

@@ -210,8 +210,8 @@ const TIMES_RATIO: [usize; 20] = {
     table
 };
 
-/// Steps 4 and 5: the 15 monomials without `q1` by the others, from the rows of those with `q4` on; `None` where the equations
-/// are dependent.
+/// Step 4 and the elimination of step 5: the 15 monomials without `q1` by the others, over [`COLUMNS`]. The first
+/// [`WITHOUT_Q4`] rows are not valid. `None` where the equations are dependent.
 fn fifteen_relations(quartics: &[Quartic; 10]) -> Option<[[f64; 35]; 15]> {
     let mut thirty = [[0.0; 56]; 30];
     for (row, times) in TIMES.iter().enumerate() {

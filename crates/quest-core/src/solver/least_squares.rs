@@ -19,8 +19,12 @@ pub(crate) fn principal_basis(rows: impl Iterator<Item = [f64; 9]>) -> ([f64; 9]
             }
         }
     }
-    let gram = SMatrix::<f64, 9, 9>::from_fn(|i, j| lower[i.max(j)][i.min(j)]);
-    let eigen = SymmetricEigen::new(gram);
+    principal_axes(&SMatrix::from_fn(|i, j| lower[i.max(j)][i.min(j)]))
+}
+
+/// The eigenvalues of a Gram matrix, the largest first, and their vectors.
+pub(crate) fn principal_axes(gram: &SMatrix<f64, 9, 9>) -> ([f64; 9], [[f64; 9]; 9]) {
+    let eigen = SymmetricEigen::new(*gram);
     let mut order = [0, 1, 2, 3, 4, 5, 6, 7, 8];
     order.sort_unstable_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
     let basis = order.map(|k| std::array::from_fn(|i| eigen.eigenvectors[(i, k)]));

@@ -22,7 +22,7 @@
 //!
 //! Not in the paper: the last digits by Newton's iteration, and another basis of the null space where roots are too close to
 //! tell whether they are real (`five_point.rs`, which also says what becomes of more than five matches). Without
-//! these, one true rotation in a thousand is off by more than 1e-6 rad in scenes without noise; with them one in 30,000.
+//! these, one true rotation in a thousand is off by more than 1e-6 rad in scenes without noise; with them one in 100,000.
 //!
 //! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points); an exact pure
 //! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.01 one true rotation in a hundred is

@@ -13,7 +13,9 @@
 //! depends on the frame of the camera. In a narrow field of view it is Hartley's transformation; in a wide one each match
 //! counts by its bearings and not by how far from the image centre it is.
 
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::algebra::symmetric::smallest_eigenvector_3;
 
 /// The normalising transformation of one view, a symmetric matrix.
 pub(crate) struct Normalisation {
@@ -24,12 +26,12 @@ pub(crate) struct Normalisation {
 impl Normalisation {
     pub(crate) fn new<'a>(bearings: impl Iterator<Item = &'a Vector3<f64>>) -> Self {
         let moments: Matrix3<f64> = bearings.map(|x| x * x.transpose()).sum();
-        let eigen = SymmetricEigen::new(moments);
-        let axis = eigen.eigenvalues.imax();
-        let along = eigen.eigenvalues[axis];
+        let trace = moments.trace();
+        let rest = Matrix3::from_diagonal_element(trace) - moments;
+        let m = smallest_eigenvector_3(&rest).unwrap_or_else(Vector3::z);
         // Bearings that all coincide have nothing across, and are found out by what they leave undetermined.
-        let across = (eigen.eigenvalues.sum() - along).max(f64::EPSILON * along);
-        let m = eigen.eigenvectors.column(axis);
+        let across = m.dot(&(rest * m)).max(f64::EPSILON * trace);
+        let along = trace - across;
         let (parallel, scale) = (m * m.transpose(), (2.0 * along / across).sqrt());
         let perpendicular = Matrix3::identity() - parallel;
         Self { transform: parallel + perpendicular * scale, inverse: parallel + perpendicular / scale }
@@ -39,6 +41,7 @@ impl Normalisation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::SymmetricEigen;
 
     #[test]
     fn moments_are_those_of_hartley() {

@@ -24,12 +24,13 @@
 
 use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
 
-use super::aligned::{Alignment, Coordinates, Gram};
+use super::aligned::{Alignment, Coordinates};
 use super::cubics::{Resultant, combine};
 use super::essential::{decompose, real_part, twisted};
+use super::gram::Gram;
 use super::motion::Motion;
 use super::shortlist::Shortlist;
-use super::{Kinds, PoseSolver, consensus, refining};
+use super::{Kinds, PoseSolver, refining};
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -46,7 +47,7 @@ impl PoseSolver for Quest {
     const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        refining::solve(self.kinds, matches, out, from_five, from_many);
+        refining::solve(self.kinds, matches, out, from_five, starts);
     }
 }
 
@@ -81,19 +82,18 @@ fn from_five(
     Ok(shortlist)
 }
 
-/// The local minima over more than five matches.
-fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(alignment, matches);
-    let [_, _, _, _, _, mut basis @ ..] = gram.principal_basis(matches)?;
+/// The solutions of the five constraints that stand for all matches.
+fn starts(gram: &Gram, [.., n1, n2, n3, n4]: &[Coordinates; 9]) -> Shortlist {
+    let mut basis = [*n1, *n2, *n3, *n4];
     let mut starts = Shortlist::new();
     for mixing in MIXINGS {
-        let roots = Roots::new(&basis, alignment);
+        let roots = Roots::new(&basis, &gram.alignment);
         let complete = roots.real(|motion| {
-            starts.push(CandidateKind::Exact, motion);
+            starts.push_pair(CandidateKind::Exact, motion);
             true
         });
         roots.complex(|q_21, _| {
-            let direction = translation_direction(&q_21, matches);
+            let direction = gram.direction(&q_21);
             starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
         });
         if complete {
@@ -101,9 +101,7 @@ fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortl
         }
         basis = mixed(&basis, &mixing);
     }
-    let mut refined = starts.refined(&gram, matches);
-    consensus::add(&mut refined, matches, motions_of_five);
-    Ok(refined)
+    starts
 }
 
 /// The exact motions of five matches on their own.
@@ -146,7 +144,7 @@ impl<'a> Roots<'a> {
         let (resultant, pivot) = Resultant::new(basis, alignment.parallax);
         let polynomial = resultant.polynomial();
         let mut real = real_roots(&polynomial);
-        real.certain &= pivot > SMALL_PIVOT;
+        real.certain &= pivot > SMALL_PIVOT && !real.close;
         Self { basis, alignment, resultant, polynomial, real }
     }
 

@@ -25,18 +25,17 @@
 
 use nalgebra::{Complex, ComplexField, UnitQuaternion};
 
-use super::aligned::{Alignment, Gram};
+use super::aligned::Coordinates;
+use super::gram::Gram;
 use super::motion::Motion;
-use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use super::twenty::{TwentySolutions, from_five, pre_rotations};
-use super::{Kinds, PoseSolver, consensus, refining};
+use super::{Kinds, PoseSolver, refining};
 use crate::algebra::monomials::position;
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
 use crate::quaternion::{bilinear, minors_with_q, minors_without_q};
-use crate::structure::translation_direction;
-use crate::{Candidates, Correspondence, Degeneracy};
+use crate::{Candidates, Correspondence};
 
 /// The eigenvalue method of section 7.1 of the paper; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,27 +49,24 @@ impl PoseSolver for QuestEigen {
     const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        refining::solve(self.kinds, matches, out, from_five::<Spectrum>, from_many);
+        refining::solve(self.kinds, matches, out, from_five::<Spectrum>, starts);
     }
 }
 
-/// The local minima over more than five matches.
-fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let gram = Gram::new(alignment, matches);
-    let [leading @ .., _, _, _, _] = gram.principal_basis(matches)?;
+/// The solutions of the five constraints that stand for all matches.
+fn starts(gram: &Gram, [n1, n2, n3, n4, n5, ..]: &[Coordinates; 9]) -> Shortlist {
     let mut starts = Shortlist::new();
     let g = pre_rotations()[0];
-    let m = leading.map(|row| bilinear(&(g.to_rotation_matrix() * alignment.constraint(&row))));
+    let turned = |row| bilinear(&(g.to_rotation_matrix() * gram.alignment.constraint(row)));
+    let m = [n1, n2, n3, n4, n5].map(turned);
     if let Some(spectrum) = Spectrum::new(&minors_with_q(&m), &minors_without_q(&m)) {
         for &value in spectrum.values() {
             if let Some((kind, q_21)) = spectrum.rotation(value, &g) {
-                starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
+                starts.push(kind, Motion { q_21, direction: gram.direction(&q_21) });
             }
         }
     }
-    let mut refined = starts.refined(&gram, matches);
-    consensus::add(&mut refined, matches, motions_of_five);
-    Ok(refined)
+    starts
 }
 
 /// The columns of the elimination: first the 15 monomials without `q1`, those without `q2` ahead of the others, then

@@ -1,41 +1,77 @@
 //! What the solvers share that refine their solutions: everything around the way from matches to motions.
+//!
+//! For more than five matches:
+//! 1. All constraints become one matrix in the frame of the best alignment (`gram.rs`).
+//! 2. The solver finds the solutions of the few constraints that stand for all.
+//! 3. Each leads to a local minimum of a cost near the Sampson errors that does not depend on the number of matches; of these
+//!    minima the ones stay that the noise may have made.
+//! 4. The squared Sampson errors over all matches decide the rest.
+//! 5. Where no candidate fits, the motion on which most matches agree is added (`consensus.rs`).
 
-use super::Kinds;
-use super::aligned::Alignment;
+use super::aligned::{Alignment, Coordinates};
+use super::gram::Gram;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
+use super::{Kinds, consensus};
+use crate::structure::translation_direction;
 use crate::{Candidates, Correspondence, Degeneracy};
 
 /// The smallest number of matches of every solver here.
 pub(crate) const MIN_MATCHES: usize = 5;
 
-/// Fills `out` with the motions that the solver finds for five matches, or for more, and with the rotation alone; what
-/// cannot be solved is answered with its reason.
+/// Fills `out` with the motions that the solver finds for five matches, or with the local minima that are reached from its
+/// `starts` for more, and with the rotation alone; what cannot be solved is answered with its reason.
+///
+/// `starts` are found by the constraints of all matches and their [`principal_basis`](Gram::principal_basis).
 pub(crate) fn solve(
     kinds: Kinds,
     matches: &[Correspondence],
     out: &mut Candidates,
     from_five: impl FnOnce(Kinds, &Alignment, &[Correspondence; 5]) -> Result<Shortlist, Degeneracy>,
-    from_many: impl FnOnce(&Alignment, &[Correspondence]) -> Result<Shortlist, Degeneracy>,
+    starts: impl FnOnce(&Gram, &[Coordinates; 9]) -> Shortlist,
 ) {
     out.clear();
     if matches.len() < MIN_MATCHES {
         return out.set_degeneracy(Degeneracy::TooFewMatches);
     }
+    let Ok(five) = matches.try_into() else { return solve_many(kinds, matches, out, starts) };
     let alignment = Alignment::new(matches);
     if alignment.is_pure_rotation() {
         return pure_rotation(&alignment, matches, out);
     }
-    let found = match matches.try_into() {
-        Ok(five) => from_five(kinds, &alignment, five),
-        Err(_) => from_many(&alignment, matches),
-    };
-    match found {
+    match from_five(kinds, &alignment, five) {
         Err(degeneracy) => out.set_degeneracy(degeneracy),
         Ok(shortlist) => {
             if kinds == Kinds::All {
-                out.push(rotation_only(&alignment, matches));
+                let q0_21 = alignment.q0_21;
+                out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
             }
             shortlist.write(kinds, matches, out);
         }
     }
+}
+
+fn solve_many(
+    kinds: Kinds,
+    matches: &[Correspondence],
+    out: &mut Candidates,
+    starts: impl FnOnce(&Gram, &[Coordinates; 9]) -> Shortlist,
+) {
+    let mut gram = Gram::aligned(matches);
+    if gram.alignment.is_pure_rotation() {
+        return pure_rotation(&gram.alignment, matches, out);
+    }
+    let basis = match gram.principal_basis(matches) {
+        Err(degeneracy) => return out.set_degeneracy(degeneracy),
+        Ok(basis) => basis,
+    };
+    let (mut minima, smallest) = starts(&gram, &basis).refined(&gram, matches);
+    // No match is far off where even their sum is small.
+    if smallest > matches.len() as f64 * consensus::AGREEMENT.powi(2) {
+        consensus::add(&mut minima, matches);
+    }
+    if kinds == Kinds::All {
+        let q0_21 = gram.alignment.q0_21;
+        out.push(rotation_only(q0_21, &gram.direction(&q0_21), matches));
+    }
+    minima.write(kinds, matches, out);
 }

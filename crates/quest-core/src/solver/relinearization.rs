@@ -34,14 +34,14 @@
 
 use nalgebra::{ComplexField, Quaternion, UnitQuaternion};
 
-use super::aligned::{Alignment, Gram};
-use super::consensus::{self, AGREEMENT};
+use super::aligned::Coordinates;
+use super::consensus::AGREEMENT;
 use super::essential::real_part;
+use super::gram::Gram;
 use super::homography::motions_of_plane;
 use super::minor_values::{minors_at_points, monomials};
 use super::moments::Pencil;
 use super::motion::Motion;
-use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use super::twenty::from_five;
 use super::{Kinds, PoseSolver, refining};
@@ -51,8 +51,7 @@ use crate::algebra::monomials::{position, sum};
 use crate::algebra::singular::shortest_directions;
 use crate::quaternion::bilinear;
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
-use crate::structure::translation_direction;
-use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+use crate::{CandidateKind, Candidates, Correspondence};
 
 /// The relinearisation of sections 4.2 and 7.2 of the paper; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,24 +65,27 @@ impl PoseSolver for Relinearization {
     const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        refining::solve(self.kinds, matches, out, from_five::<Pencil>, from_many);
+        refining::solve(self.kinds, matches, out, from_five::<Pencil>, |gram, basis| {
+            starts(gram, basis, matches)
+        });
     }
 }
 
-/// The local minima over more than five matches next to the solutions.
-fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortlist, Degeneracy> {
-    let [leading @ .., _, _, _] = Gram::new(alignment, matches).principal_basis(matches)?;
-    let rows = minors_at_points(&leading.map(|row| bilinear(&alignment.constraint(&row))));
+/// The solutions of the six constraints that stand for all matches, and the motions of a plane.
+fn starts(gram: &Gram, basis: &[Coordinates; 9], matches: &[Correspondence]) -> Shortlist {
     let mut starts = Shortlist::new();
-    for (kind, q_21) in solutions(rows).into_iter().flatten() {
-        starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
+    for (kind, q_21) in solutions(rows(gram, basis)).into_iter().flatten() {
+        starts.push(kind, Motion { q_21, direction: gram.direction(&q_21) });
     }
     for motion in motions_of_plane(matches, AGREEMENT).into_iter().flatten() {
         starts.push(CandidateKind::Exact, motion);
     }
-    let mut minima = starts.minimised(matches);
-    consensus::add(&mut minima, matches, motions_of_five);
-    Ok(minima)
+    starts
+}
+
+/// The minors of the six constraints, at the points.
+fn rows(gram: &Gram, [n1, n2, n3, n4, n5, n6, ..]: &[Coordinates; 9]) -> [[f64; 35]; 35] {
+    minors_at_points(&[n1, n2, n3, n4, n5, n6].map(|row| bilinear(&gram.alignment.constraint(row))))
 }
 
 /// The index of a monomial of degree 8 in lexicographic order.
@@ -257,7 +259,9 @@ mod tests {
             for index in 0..100 {
                 let options = SceneOptions { points, ..SceneOptions::default() };
                 let scene = Scene::generate(&options, SEED, index).unwrap();
-                let rows = rows(&Alignment::new(&scene.matches), &scene.matches);
+                let mut gram = Gram::aligned(&scene.matches);
+                let basis = gram.principal_basis(&scene.matches).unwrap();
+                let rows = rows(&gram, &basis);
                 let directions = shortest_directions::<35, 35, 2>(&mut rows.clone()).map(|w| monomials(&w));
                 let directions = SMatrix::<f64, 35, 2>::from_fn(|i, j| directions[j][i]);
                 let inverse = directions.pseudo_inverse(0.0).unwrap();
@@ -273,10 +277,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    fn rows(alignment: &Alignment, matches: &[Correspondence]) -> [[f64; 35]; 35] {
-        let [leading @ .., _, _, _] = Gram::new(alignment, matches).principal_basis(matches).unwrap();
-        minors_at_points(&leading.map(|row| bilinear(&alignment.constraint(&row))))
     }
 }

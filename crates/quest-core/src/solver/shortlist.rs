@@ -3,11 +3,12 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::Kinds;
-use super::aligned::{Alignment, Gram};
+use super::aligned::Alignment;
+use super::gram::Gram;
 use super::motion::{Motion, Outcome};
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
-use crate::structure::{Completed, translation_direction, with_depths};
+use crate::structure::{Completed, pair_with_depths, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -16,13 +17,50 @@ const SAME: f64 = 1e-6;
 /// The same for local minima over many matches, which no two of a different origin reach in the same place.
 const SAME_MINIMUM: f64 = 1e-3;
 
+/// How far behind the best a motion may be and still be kept.
+struct Allowance {
+    /// The logarithm of its likelihood.
+    likelihood: f64,
+    /// The factor between the costs that is granted in any case.
+    factor: f64,
+    /// What a match may cost without counting: the square of an angle over the parallax.
+    unresolved: f64,
+}
+
+/// A start is not at its minimum yet.
+const STARTS: Allowance = Allowance { likelihood: 30.0, factor: 1e3, unresolved: 1e-7 };
+
+/// A coarse minimum is not one of the Sampson errors yet.
+const MINIMA: Allowance = Allowance { likelihood: 15.0, factor: 3.0, unresolved: 1e-10 };
+
 /// Residuals below this are zero: rounding, not quality, and must not decide the order.
 const ROUNDING: f64 = 1e-12;
+
+/// One motion, or the two of an essential matrix: the motion and its twisted partner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Item {
+    /// Where it comes from.
+    pub(crate) kind: CandidateKind,
+    /// The motion.
+    pub(crate) motion: Motion,
+    is_pair: bool,
+}
+
+impl Item {
+    /// Whether the essential matrix or the one motion of `other` is here as well.
+    #[inline]
+    fn covers(&self, other: &Self, tolerance: f64) -> bool {
+        let (old, new) = (&self.motion, &other.motion);
+        old.has_direction_of(new, tolerance)
+            && (old.has_rotation_of(new, tolerance)
+                || (self.is_pair || other.is_pair) && old.twisted().has_rotation_of(new, tolerance))
+    }
+}
 
 /// Motions found so far, without duplicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Shortlist {
-    items: [Option<(CandidateKind, Motion)>; Candidates::CAPACITY],
+    items: [Item; Candidates::CAPACITY],
     len: usize,
     /// Motions closer than this are one.
     same: f64,
@@ -30,53 +68,58 @@ pub(crate) struct Shortlist {
 
 impl Shortlist {
     pub(crate) fn new() -> Self {
-        Self { items: [None; Candidates::CAPACITY], len: 0, same: SAME }
+        let motion = Motion { q_21: UnitQuaternion::identity(), direction: Vector3::z() };
+        let item = Item { kind: CandidateKind::Exact, motion, is_pair: false };
+        Self { items: [item; Candidates::CAPACITY], len: 0, same: SAME }
     }
 
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &(CandidateKind, Motion)> {
-        self.items[..self.len].iter().flatten()
+    /// The motions, of two twisted partners one.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Item> {
+        self.items[..self.len].iter()
     }
 
-    /// How many there are of a kind.
+    /// How many motions there are of a kind.
     pub(crate) fn count(&self, kind: CandidateKind) -> usize {
-        self.iter().filter(|(k, _)| *k == kind).count()
+        self.iter().filter(|item| item.kind == kind).map(|item| 1 + usize::from(item.is_pair)).sum()
     }
 
     /// Drops all but one kind.
     pub(crate) fn retain(&mut self, kind: CandidateKind) {
-        let all = std::mem::replace(self, Self::new());
-        for (_, motion) in all.iter().filter(|(k, _)| *k == kind) {
-            self.push(kind, *motion);
-        }
+        self.retain_where(|item| item.kind == kind);
     }
 
-    /// Adds a motion unless it is there already. A duplicate counts as exact if either of the two is.
-    pub(crate) fn push(&mut self, kind: CandidateKind, motion: Motion) {
-        for (other_kind, other) in self.items[..self.len].iter_mut().flatten() {
-            if other.is_close(&motion, self.same) {
-                if kind == CandidateKind::Exact && *other_kind != CandidateKind::Exact {
-                    (*other_kind, *other) = (kind, motion);
-                }
-                return;
+    fn retain_where(&mut self, keep: impl Fn(&Item) -> bool) {
+        let mut kept = 0;
+        for k in 0..self.len {
+            if keep(&self.items[k]) {
+                self.items[kept] = self.items[k];
+                kept += 1;
             }
         }
-        self.append(kind, motion);
+        self.len = kept;
     }
 
-    fn append(&mut self, kind: CandidateKind, motion: Motion) {
-        if self.len < self.items.len() {
-            self.items[self.len] = Some((kind, motion));
-            self.len += 1;
-        }
+    /// Adds a motion unless it is there already.
+    pub(crate) fn push(&mut self, kind: CandidateKind, motion: Motion) {
+        self.push_item(&Item { kind, motion, is_pair: false });
     }
 
-    /// Adds the two motions of an essential matrix.
+    /// Adds the two motions of an essential matrix unless they are there already.
     pub(crate) fn push_pair(&mut self, kind: CandidateKind, motion: Motion) {
-        let before = self.len;
-        self.push(kind, motion);
-        // Either both rotations are there already, or neither.
-        if self.len > before {
-            self.append(kind, motion.twisted());
+        self.push_item(&Item { kind, motion, is_pair: true });
+    }
+
+    /// A duplicate counts as exact if either of the two is.
+    fn push_item(&mut self, new: &Item) {
+        let same = self.same;
+        let replaces = |old: &Item| new.kind == CandidateKind::Exact && old.kind != CandidateKind::Exact;
+        if self.iter().any(|old| !replaces(old) && old.covers(new, same)) {
+            return;
+        }
+        self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
+        if let Some(place) = self.items.get_mut(self.len) {
+            *place = *new;
+            self.len += 1;
         }
     }
 
@@ -102,65 +145,73 @@ impl Shortlist {
         }
     }
 
-    /// The local minima of the squared Sampson errors over all matches that these motions lead to.
-    pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> Self {
-        let mut coarse = Self::new();
-        for (kind, motion) in self.iter() {
-            let mut motion = *motion;
-            motion.minimise_gram(gram, 30);
-            // Twisted partners have the same errors.
-            if !coarse.contains(&motion.twisted()) {
-                coarse.push(*kind, motion);
-            }
+    /// The local minima of the summed squares of the Sampson errors over all matches that these motions lead to, and the
+    /// smallest sum.
+    pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> (Self, f64) {
+        let mut coarse = Self { same: SAME_MINIMUM, ..Self::new() };
+        for &Item { kind, mut motion, .. } in self.plausible(gram, &STARTS).iter() {
+            gram.minimise(&mut motion);
+            coarse.push_pair(kind, motion);
         }
-        // Of two that end in the same place the better one is to stay.
-        let cost =
-            |item: &Option<(CandidateKind, Motion)>| item.map_or(0.0, |(_, motion)| gram.cost(&motion));
-        coarse.items[..coarse.len].sort_unstable_by(|x, y| cost(x).total_cmp(&cost(y)));
-        coarse.minimised(matches)
+        let (mut fine, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
+        for &Item { kind, mut motion, .. } in coarse.plausible(gram, &MINIMA).iter() {
+            smallest = motion.minimise_sampson(matches, f64::INFINITY, 15).min(smallest);
+            fine.push_pair(kind, motion);
+        }
+        (fine, smallest)
     }
 
-    /// The same of few motions that are near their minima.
-    pub(crate) fn minimised(&self, matches: &[Correspondence]) -> Self {
-        let mut fine = Self { same: SAME_MINIMUM, ..Self::new() };
-        for (kind, motion) in self.iter() {
-            let mut motion = *motion;
-            motion.minimise_sampson(matches, f64::INFINITY, 30);
-            fine.push_pair(*kind, motion);
+    /// Those whose costs are not too far above the smallest, the best first.
+    ///
+    /// With noise of unknown size the logarithm of the likelihood is `−n/2 ln(cost)`, with `n` matches beyond the five that
+    /// any motion fits.
+    fn plausible(&self, gram: &Gram, allowance: &Allowance) -> Self {
+        let mut costs = [(0.0, 0); Candidates::CAPACITY];
+        for (k, item) in self.iter().enumerate() {
+            costs[k] = (gram.cost(&item.motion), k);
         }
-        fine
-    }
-
-    fn contains(&self, motion: &Motion) -> bool {
-        self.iter().any(|(_, other)| other.is_close(motion, self.same))
+        let costs = &mut costs[..self.len];
+        costs.sort_unstable_by(|x, y| x.0.total_cmp(&y.0));
+        let factor = (2.0 * allowance.likelihood / gram.beyond_five()).exp().max(allowance.factor);
+        let unresolved = allowance.unresolved * gram.count;
+        let limit = costs.first().map_or(0.0, |(smallest, _)| factor * (smallest + unresolved));
+        let mut sorted = Self { len: costs.iter().take_while(|(cost, _)| *cost <= limit).count(), ..*self };
+        for (place, (_, k)) in sorted.items.iter_mut().zip(&*costs) {
+            *place = self.items[*k];
+        }
+        sorted
     }
 
     /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
     pub(crate) fn write(&self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
-        for (kind, motion) in self.iter() {
-            if kinds == Kinds::All || *kind == CandidateKind::Exact {
-                out.push(candidate(*kind, motion.q_21, &motion.direction, matches));
+        for Item { kind, motion: Motion { q_21, direction }, is_pair } in self.iter() {
+            if kinds != Kinds::All && *kind != CandidateKind::Exact {
+                continue;
+            }
+            if *is_pair {
+                for completed in pair_with_depths(*q_21, direction, matches) {
+                    out.push(candidate(*kind, &completed));
+                }
+            } else {
+                out.push(candidate(*kind, &with_depths(*q_21, direction, matches)));
             }
         }
         rank(out);
     }
 }
 
-/// A candidate with its translation's length and sign, its residual and its points in front.
-fn candidate(
-    kind: CandidateKind,
-    q_21: UnitQuaternion<f64>,
-    direction: &Vector3<f64>,
-    matches: &[Correspondence],
-) -> Candidate {
-    let Completed { pose, in_front, residual } = with_depths(q_21, direction, matches);
+fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
+    let Completed { pose, in_front, residual } = *completed;
     Candidate { kind, pose, residual, in_front }
 }
 
-/// The rotation-only candidate: the best alignment, and the translation that fits it best.
-pub(crate) fn rotation_only(alignment: &Alignment, matches: &[Correspondence]) -> Candidate {
-    let direction = translation_direction(&alignment.q0_21, matches);
-    candidate(CandidateKind::RotationOnly, alignment.q0_21, &direction, matches)
+/// The rotation-only candidate: the best alignment, and the direction of the translation that fits it best.
+pub(crate) fn rotation_only(
+    q0_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> Candidate {
+    candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
 /// The one candidate of an exact pure rotation, unless the matches leave that undetermined too.
@@ -176,10 +227,20 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
-fn rank(out: &mut Candidates) {
-    let key = |c: &Candidate| (c.residual.max(ROUNDING), -c.pose.wxyz()[0]);
-    out.as_mut_slice().sort_unstable_by(|x, y| {
-        let ((r, w), (s, v)) = (key(x), key(y));
-        y.in_front.cmp(&x.in_front).then(r.total_cmp(&s)).then(w.total_cmp(&v))
-    });
+pub(crate) fn rank(out: &mut Candidates) {
+    // Positive numbers are ordered as their bits are: keys are compared as integers, and candidates moved once.
+    let key = |(k, c): (usize, &Candidate)| {
+        let residual = c.residual.max(ROUNDING).to_bits();
+        (usize::MAX - c.in_front, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits(), k)
+    };
+    let mut order = [(0, 0, 0, 0); Candidates::CAPACITY];
+    let order = &mut order[..out.len()];
+    for (place, candidate) in order.iter_mut().zip(out.iter().enumerate()) {
+        *place = key(candidate);
+    }
+    order.sort_unstable();
+    let unordered = out.clone();
+    for (place, (.., k)) in out.as_mut_slice().iter_mut().zip(order) {
+        *place = unordered[*k];
+    }
 }

@@ -1,6 +1,6 @@
 //! A panel as plotly sees it.
 
-use plotly::common::{DashType, Fill, HoverInfo, Line, Marker, MarkerSymbol, Mode};
+use plotly::common::{DashType, ExponentFormat, Fill, HoverInfo, Line, Marker, MarkerSymbol, Mode};
 use plotly::layout::{Axis as PlotlyAxis, AxisRange, AxisType, HoverMode, Layout, Margin};
 use plotly::{Plot, Scatter};
 
@@ -33,6 +33,7 @@ fn axis(axis: &Axis) -> PlotlyAxis {
         .grid_color(GRID.hex())
         .zero_line_color(GRID.hex())
         .line_color(MUTED.hex())
+        .exponent_format(ExponentFormat::Power)
         .auto_margin(true);
     match axis.range {
         // plotly wants the exponents of a logarithmic axis.

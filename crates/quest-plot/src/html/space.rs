@@ -1,7 +1,7 @@
 //! A scene in three dimensions as plotly sees it.
 
 use plotly::common::{HoverInfo, Line, Marker, Mode};
-use plotly::layout::{AspectMode, Axis, Layout, LayoutScene, Margin};
+use plotly::layout::{AspectMode, Axis, Camera, Layout, LayoutScene, Margin};
 use plotly::{Plot, Scatter3D};
 
 use crate::colour::GRID;
@@ -14,8 +14,14 @@ pub(super) fn plot(space: &Space) -> Plot {
     }
     let axis = |name: &str| Axis::new().title(name).grid_color(GRID.hex()).show_spikes(false);
     let [x, y, z] = &space.axes;
-    let scene =
-        LayoutScene::new().aspect_mode(AspectMode::Data).x_axis(axis(x)).y_axis(axis(y)).z_axis(axis(z));
+    let ([up_x, up_y, up_z], [eye_x, eye_y, eye_z]) = (space.up, space.eye);
+    let camera = Camera::new().up((up_x, up_y, up_z).into()).eye((eye_x, eye_y, eye_z).into());
+    let scene = LayoutScene::new()
+        .camera(camera)
+        .aspect_mode(AspectMode::Data)
+        .x_axis(axis(x))
+        .y_axis(axis(y))
+        .z_axis(axis(z));
     let margin = Margin::new().left(0).right(0).top(0).bottom(0);
     plot.set_layout(Layout::new().show_legend(false).margin(margin).scene(scene));
     plot

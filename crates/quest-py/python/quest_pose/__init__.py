@@ -13,23 +13,35 @@ forward).
 >>> camera.bearing([[514, 384]])
 array([[0., 0., 1.]])
 
-``solve`` finds candidate poses from five or more correct matches. All errors are a ``QuestError``.
+``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``solve`` the
+candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a
+``QuestError``.
 """
 
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from quest_pose._core import (
     BadCamera,
     Camera,
     Candidate,
     DegenerateInput,
+    Estimate,
+    EstimateBatch,
+    NoPose,
     NotFinite,
     QuestError,
+    RunnerUp,
     ShapeMismatch,
     TooFewMatches,
     __version__,
+    _solve_batch,
     _solvers,
     constraint_matrix,
+    estimate,
+    estimate_batch,
     solve,
 )
 
@@ -38,14 +50,22 @@ __all__ = [
     "Camera",
     "Candidate",
     "DegenerateInput",
+    "Estimate",
+    "EstimateBatch",
+    "NoPose",
     "NotFinite",
     "QuestError",
+    "RunnerUp",
     "ShapeMismatch",
+    "SolvedBatch",
     "SolverInfo",
     "TooFewMatches",
     "__version__",
     "constraint_matrix",
+    "estimate",
+    "estimate_batch",
     "solve",
+    "solve_batch",
     "solvers",
 ]
 
@@ -72,3 +92,64 @@ def solvers() -> list[SolverInfo]:
         Named tuples of name, min_matches, max_candidates and reference.
     """
     return [SolverInfo(*row) for row in _solvers()]
+
+
+class SolvedBatch(NamedTuple):
+    """The candidates of many samples, in columns."""
+
+    offsets: NDArray[np.int64]
+    """(B + 1,): the candidates of sample ``b`` are ``offsets[b]`` to ``offsets[b + 1]``, best first."""
+    quat_wxyz: NDArray[np.float64]
+    """(M, 4): the rotations as unit quaternions, scalar first."""
+    t: NDArray[np.float64]
+    """(M, 3): the translations; the mean absolute depth over both views is 1."""
+    in_front: NDArray[np.int64]
+    """(M,): how many of the five matches have positive depth in both views."""
+    residual: NDArray[np.float64]
+    """(M,): how far the matches are from satisfying the epipolar constraint, in radians."""
+
+    @property
+    def sample(self) -> NDArray[np.int64]:
+        """(M,): the sample that each candidate belongs to."""
+        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
+
+    @property
+    def R(self) -> NDArray[np.float64]:
+        """(M, 3, 3): the rotation matrices."""
+        w, x, y, z = self.quat_wxyz.T
+        rows = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        return np.moveaxis(np.array(rows), 2, 0)
+
+
+def solve_batch(x1: ArrayLike, x2: ArrayLike) -> SolvedBatch:
+    """Candidate poses of many samples of five matches, on all cores.
+
+    What ``solve(x1[b], x2[b], kinds="exact")`` finds for every sample ``b``, several samples at a time in vector
+    registers.
+
+    Parameters
+    ----------
+    x1, x2 : array_like of shape (B, 5, 2) or (B, 5, 3)
+        The same five points of B samples in view 1 and in view 2, on the plane z = 1 of each camera or as bearings of
+        any length.
+
+    Returns
+    -------
+    SolvedBatch
+        Named columns. A sample that determines no pose, or only a rotation, has no candidates. The result does not
+        depend on the number of cores.
+
+    Raises
+    ------
+    NotFinite, ShapeMismatch, DegenerateInput
+        As ``solve``.
+
+    Notes
+    -----
+    The lock of the interpreter is released while the solver works.
+    """
+    return SolvedBatch(*_solve_batch(x1, x2))

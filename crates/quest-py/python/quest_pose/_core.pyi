@@ -7,23 +7,39 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "BadCamera",
     "Camera",
+    "CameraServo",
     "Candidate",
+    "Command",
     "DegenerateInput",
+    "Estimate",
+    "EstimateBatch",
+    "NoPose",
     "NotFinite",
     "QuestError",
+    "RobotServo",
+    "RunnerUp",
     "ShapeMismatch",
     "TooFewMatches",
     "__version__",
     "_candidate",
+    "_estimate",
+    "_estimate_batch",
+    "_runner_up",
+    "_solve_batch",
     "_solvers",
     "constraint_matrix",
+    "estimate",
+    "estimate_batch",
     "solve",
 ]
 
 __version__: str
 
 _Array: TypeAlias = NDArray[np.float64]
+_Bools: TypeAlias = NDArray[np.bool_]
+_Counts: TypeAlias = NDArray[np.uint64]
 _Kind: TypeAlias = Literal["exact", "from_complex", "rotation_only"]
+_Model: TypeAlias = Literal["general", "planar", "pure_rotation", "degenerate"]
 
 class QuestError(ValueError): ...
 class TooFewMatches(QuestError): ...
@@ -31,6 +47,7 @@ class NotFinite(QuestError): ...
 class ShapeMismatch(QuestError): ...
 class DegenerateInput(QuestError): ...
 class BadCamera(QuestError): ...
+class NoPose(QuestError): ...
 
 @final
 class Camera:
@@ -103,6 +120,216 @@ def solve(
     solver: str | None = None,
     kinds: Literal["all", "exact"] = "all",
 ) -> list[Candidate]: ...
+@type_check_only
+class _RunnerUpDict(TypedDict):
+    q_21: list[float]
+    R_21: list[list[float]]
+    t_21: list[float]
+    parallax: float
+    score: float
+    inlier_count: int
+
+@type_check_only
+class _EstimateDict(_RunnerUpDict):
+    model: _Model
+    covariance: list[list[float]]
+    inliers: list[bool]
+    iterations: int
+    runner_up: _RunnerUpDict | None
+    evidence: dict[str, float | None]
+    noise_px: float
+
+@final
+class RunnerUp:
+    @property
+    def R(self) -> _Array: ...
+    @property
+    def t(self) -> _Array: ...
+    @property
+    def quat_wxyz(self) -> _Array: ...
+    @property
+    def quat_xyzw(self) -> _Array: ...
+    @property
+    def parallax(self) -> float: ...
+    @property
+    def score(self) -> float: ...
+    @property
+    def inlier_count(self) -> int: ...
+    def to_dict(self) -> _RunnerUpDict: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Estimate:
+    @property
+    def model(self) -> _Model: ...
+    @property
+    def R(self) -> _Array: ...
+    @property
+    def t(self) -> _Array: ...
+    @property
+    def quat_wxyz(self) -> _Array: ...
+    @property
+    def quat_xyzw(self) -> _Array: ...
+    @property
+    def parallax(self) -> float: ...
+    @property
+    def covariance(self) -> _Array: ...
+    @property
+    def inliers(self) -> _Bools: ...
+    @property
+    def inlier_count(self) -> int: ...
+    @property
+    def score(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def runner_up(self) -> RunnerUp | None: ...
+    @property
+    def evidence(self) -> dict[str, float]: ...
+    @property
+    def noise_px(self) -> float: ...
+    def to_dict(self) -> _EstimateDict: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class EstimateBatch:
+    @property
+    def model(self) -> list[_Model | None]: ...
+    @property
+    def reason(self) -> list[str | None]: ...
+    @property
+    def found(self) -> _Bools: ...
+    @property
+    def R(self) -> _Array: ...
+    @property
+    def t(self) -> _Array: ...
+    @property
+    def quat_wxyz(self) -> _Array: ...
+    @property
+    def covariance(self) -> _Array: ...
+    @property
+    def inliers(self) -> _Bools: ...
+    @property
+    def inlier_count(self) -> _Counts: ...
+    @property
+    def score(self) -> _Array: ...
+    @property
+    def iterations(self) -> _Counts: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+def estimate(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    camera1: Camera | ArrayLike | None = None,
+    camera2: Camera | ArrayLike | None = None,
+    *,
+    threshold: float | None = None,
+    confidence: float = 0.9999,
+    min_iterations: int = 300,
+    max_iterations: int = 100_000,
+    seed: int = 0,
+    solver: str | None = None,
+    scores: ArrayLike | None = None,
+    initial_pose: tuple[ArrayLike, ArrayLike] | None = None,
+    known_direction: tuple[ArrayLike, ArrayLike, float] | None = None,
+) -> Estimate: ...
+def estimate_batch(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    offsets: ArrayLike,
+    cameras1: Camera | ArrayLike | Sequence[Camera | ArrayLike] | None = None,
+    cameras2: Camera | ArrayLike | Sequence[Camera | ArrayLike] | None = None,
+    *,
+    threshold: float | None = None,
+    confidence: float = 0.9999,
+    min_iterations: int = 300,
+    max_iterations: int = 100_000,
+    seed: int = 0,
+    solver: str | None = None,
+    num_threads: int = 0,
+) -> EstimateBatch: ...
+def _estimate(state: tuple[Any, ...]) -> Estimate: ...
+def _estimate_batch(state: tuple[Any, ...]) -> EstimateBatch: ...
+def _runner_up(state: tuple[Any, ...]) -> RunnerUp: ...
 def constraint_matrix(x1: ArrayLike, x2: ArrayLike) -> _Array: ...
+def _solve_batch(
+    x1: ArrayLike, x2: ArrayLike
+) -> tuple[NDArray[np.int64], _Array, _Array, NDArray[np.int64], _Array]: ...
 def _candidate(state: tuple[Any, ...]) -> Candidate: ...
 def _solvers() -> list[tuple[str, int, int, str]]: ...
+
+@final
+class Command:
+    @property
+    def linear(self) -> _Array: ...
+    @property
+    def angular(self) -> _Array: ...
+    @property
+    def speed(self) -> float: ...
+    @property
+    def turn_rate(self) -> float: ...
+    @property
+    def state(
+        self,
+    ) -> Literal[
+        "tracking", "starting", "too_few_features", "degenerate", "inconsistent", "jump", "uncertain"
+    ]: ...
+    @property
+    def R(self) -> _Array | None: ...
+    @property
+    def t(self) -> _Array | None: ...
+    @property
+    def inliers(self) -> int: ...
+
+@final
+class CameraServo:
+    def __new__(
+        cls,
+        goal: ArrayLike,
+        camera: Camera | ArrayLike | None = None,
+        *,
+        max_speed: float,
+        max_turn_rate: float,
+        noise: float,
+        goal_images: int = 1,
+        period: float = 0.1,
+        unit: float = 1.0,
+        rate: float = 0.5,
+        depths: ArrayLike | None = None,
+        solver: str | None = None,
+    ) -> CameraServo: ...
+    def step(self, points: ArrayLike, /) -> Command: ...
+
+@final
+class RobotServo:
+    def __new__(
+        cls,
+        goal: ArrayLike,
+        camera: Camera | ArrayLike | None = None,
+        *,
+        max_speed: float,
+        max_turn_rate: float,
+        noise: float,
+        goal_images: int = 1,
+        period: float = 0.1,
+        unit: float = 1.0,
+        speed_gain: float = 0.5,
+        turn_gain: float = 1.0,
+        tilt: float = 0.01,
+        border: float = 40.0,
+        depths: ArrayLike | None = None,
+        solver: str | None = None,
+    ) -> RobotServo: ...
+    def step(self, points: ArrayLike, /) -> Command: ...
+    @property
+    def has_arrived(self) -> bool: ...

@@ -4,7 +4,7 @@ use super::kernel::Kernel;
 use crate::lanes::instructions::{Task, Token};
 use crate::lanes::lane::{F, Float, Lanes, WordLanes};
 
-/// Columns are as long as a multiple of this, and matches are looked at as many at a time.
+/// How many matches are looked at between two questions whether to stop.
 pub(super) const BLOCK: usize = 64;
 
 /// What only this crate may implement, and call.
@@ -19,8 +19,21 @@ pub(super) mod sealed {
     }
 
     pub trait Columns<T> {
+        /// The columns of a block of matches.
+        type Block<'a>: Copy
+        where
+            Self: 'a;
+
+        /// A block of matches, filled up with NaN.
+        fn block(&self, index: usize) -> Self::Block<'_>;
+
         /// The square of `x2ᵀ E x1` and that of its gradient for the matches from `k` on, as many as there are lanes.
-        fn constraint<L: Lanes<T>>(&self, lanes: L, e: &[F<L, T>; 9], k: usize) -> (F<L, T>, F<L, T>);
+        fn constraint<L: Lanes<T>>(
+            lanes: L,
+            e: &[F<L, T>; 9],
+            block: Self::Block<'_>,
+            k: usize,
+        ) -> (F<L, T>, F<L, T>);
     }
 }
 
@@ -127,10 +140,10 @@ macro_rules! matches {
 matches!(ImageMatches, 2, "Appends a match of two points.");
 matches!(BearingMatches, 3, "Appends a match of two unit bearings.");
 
-/// Columns of the same length, filled up with NaN.
+/// Columns of the same length in blocks, filled up with NaN.
 #[derive(Clone, Debug)]
 struct Columns<T, const N: usize> {
-    columns: [Vec<T>; N],
+    columns: [Vec<[T; BLOCK]>; N],
     len: usize,
 }
 
@@ -149,27 +162,45 @@ impl<T: Real, const N: usize> Columns<T, N> {
     fn push(&mut self, row: impl Iterator<Item = T>) {
         for (column, x) in self.columns.iter_mut().zip(row) {
             if self.len % BLOCK == 0 {
-                column.resize(self.len + BLOCK, T::NAN);
+                column.push([T::NAN; BLOCK]);
             }
-            column[self.len] = x;
+            column[self.len / BLOCK][self.len % BLOCK] = x;
         }
         self.len += 1;
     }
 
     #[inline(always)]
-    fn load<L: Lanes<T>>(&self, lanes: L, k: usize) -> [F<L, T>; N] {
-        let mut out = [lanes.splat(T::NAN); N];
-        for i in 0..N {
-            out[i] = lanes.load(&self.columns[i][k..k + L::COUNT]);
-        }
-        out
+    fn block(&self, index: usize) -> [&[T; BLOCK]; N] {
+        self.columns.each_ref().map(|column| &column[index])
     }
 }
 
+/// The numbers of a block from `k` on, as many as there are lanes.
+#[inline(always)]
+fn load<T: Real, L: Lanes<T>, const N: usize>(lanes: L, block: [&[T; BLOCK]; N], k: usize) -> [F<L, T>; N] {
+    let mut out = [lanes.splat(T::NAN); N];
+    for i in 0..N {
+        out[i] = lanes.load(&block[i][k..]);
+    }
+    out
+}
+
 impl<T: Real> sealed::Columns<T> for ImageMatches<T> {
+    type Block<'a> = [&'a [T; BLOCK]; 4];
+
     #[inline(always)]
-    fn constraint<L: Lanes<T>>(&self, lanes: L, e: &[F<L, T>; 9], k: usize) -> (F<L, T>, F<L, T>) {
-        let [x, y, u, v] = self.columns.load(lanes, k);
+    fn block(&self, index: usize) -> [&[T; BLOCK]; 4] {
+        self.columns.block(index)
+    }
+
+    #[inline(always)]
+    fn constraint<L: Lanes<T>>(
+        lanes: L,
+        e: &[F<L, T>; 9],
+        block: [&[T; BLOCK]; 4],
+        k: usize,
+    ) -> (F<L, T>, F<L, T>) {
+        let [x, y, u, v] = load(lanes, block, k);
         let line2 = [
             e[0].mul_add(x, e[1].mul_add(y, e[2])),
             e[3].mul_add(x, e[4].mul_add(y, e[5])),
@@ -184,9 +215,21 @@ impl<T: Real> sealed::Columns<T> for ImageMatches<T> {
 }
 
 impl<T: Real> sealed::Columns<T> for BearingMatches<T> {
+    type Block<'a> = [&'a [T; BLOCK]; 6];
+
     #[inline(always)]
-    fn constraint<L: Lanes<T>>(&self, lanes: L, e: &[F<L, T>; 9], k: usize) -> (F<L, T>, F<L, T>) {
-        let [x, y, z, u, v, w] = self.columns.load(lanes, k);
+    fn block(&self, index: usize) -> [&[T; BLOCK]; 6] {
+        self.columns.block(index)
+    }
+
+    #[inline(always)]
+    fn constraint<L: Lanes<T>>(
+        lanes: L,
+        e: &[F<L, T>; 9],
+        block: [&[T; BLOCK]; 6],
+        k: usize,
+    ) -> (F<L, T>, F<L, T>) {
+        let [x, y, z, u, v, w] = load(lanes, block, k);
         let plane2 = [
             e[0].mul_add(x, e[1].mul_add(y, e[2] * z)),
             e[3].mul_add(x, e[4].mul_add(y, e[5] * z)),

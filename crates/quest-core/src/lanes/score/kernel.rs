@@ -28,32 +28,31 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Sum<'_, T, C> {
     #[inline(always)]
     fn run<L: Lanes<T>>(self, lanes: L) -> Score {
         match self.loss {
-            Loss::Truncated => self.sum(lanes, truncated::<T, L>),
-            Loss::Marginalised => self.sum(lanes, marginalised::<T, L>),
+            Loss::Truncated => self.sum(lanes, truncated),
+            Loss::Marginalised => self.sum(lanes, marginalised),
         }
     }
 }
 
 impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
     #[inline(always)]
-    fn sum<L: Lanes<T>>(&self, lanes: L, count: impl Fn(L, F<L, T>) -> F<L, T>) -> Score {
+    fn sum<L: Lanes<T>>(&self, lanes: L, count: impl Fn(F<L, T>, F<L, T>) -> F<L, T>) -> Score {
         let zero = lanes.splat(T::from_f64(0.0));
-        let one = lanes.splat(T::from_f64(1.0));
-        let square = lanes.splat(T::from_f64(self.threshold * self.threshold));
+        let square = self.threshold * self.threshold;
+        let limit = lanes.splat(T::from_f64(square));
         let e = splat::<T, L>(lanes, &self.e);
         let all = self.matches.len();
         let mut score = Score { sum: 0.0, visited: 0 };
         while score.visited < all {
+            let block = self.matches.block(score.visited / BLOCK);
             let mut sum = zero;
-            let mut k = score.visited;
-            while k < score.visited + BLOCK {
-                let (error, gradient) = self.matches.constraint(lanes, &e, k);
-                let ratio = error / (gradient * square);
+            for k in 0..BLOCK / L::COUNT {
+                let (error, gradient) = C::constraint(lanes, &e, block, k * L::COUNT);
+                let error = error / gradient;
                 // False for the NaN that fill the last block.
-                sum = sum + count(lanes, ratio).select(ratio.less(one), zero);
-                k += L::COUNT;
+                sum = sum + count(limit, error).select(error.less(limit), zero);
             }
-            score.sum += total::<T, L>(sum);
+            score.sum += total::<T, L>(sum) / square;
             score.visited = all.min(score.visited + BLOCK);
             if self.stop.is_reached(score.sum, score.visited, all) {
                 break;
@@ -63,17 +62,17 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
     }
 }
 
-/// `1 − u²`, by `u²`.
+/// `T² (1 − u²)`, by `T²` and the squared error `T² u²`.
 #[inline(always)]
-fn truncated<T: Real, L: Lanes<T>>(lanes: L, square: F<L, T>) -> F<L, T> {
-    lanes.splat(T::from_f64(1.0)) - square
+fn truncated<T: Real, V: Float<T>>(limit: V, error: V) -> V {
+    limit - error
 }
 
-/// `(1 − u)²`, by `u²`.
+/// `T² (1 − u)² = T² + r² − 2 T r`.
 #[inline(always)]
-fn marginalised<T: Real, L: Lanes<T>>(lanes: L, square: F<L, T>) -> F<L, T> {
-    let rest = lanes.splat(T::from_f64(1.0)) - square.sqrt();
-    rest * rest
+fn marginalised<T: Real, V: Float<T>>(limit: V, error: V) -> V {
+    let root = (limit * error).sqrt();
+    limit + error - (root + root)
 }
 
 /// The inliers of one matrix.
@@ -94,8 +93,9 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Inliers<'_, T, C> {
         let e = splat::<T, L>(lanes, &self.e);
         let mut count = 0;
         for (block, word) in self.mask.iter_mut().enumerate() {
+            let block = self.matches.block(block);
             for k in (0..BLOCK).step_by(L::COUNT) {
-                let (error, gradient) = self.matches.constraint(lanes, &e, block * BLOCK + k);
+                let (error, gradient) = C::constraint(lanes, &e, block, k);
                 let is_inlier = error.less(gradient * square);
                 let mut flags = [T::from_f64(0.0); MAX_LANES];
                 one.select(is_inlier, zero).store(&mut flags);

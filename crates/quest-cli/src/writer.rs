@@ -1,0 +1,71 @@
+//! Results of pairs, in the format asked for.
+
+use std::io::{self, Write};
+
+use quest_io::{Output, WriteError};
+use serde::Serialize;
+
+use crate::{
+    options::{Format, OutputOptions},
+    rows,
+};
+
+/// The result of one pair.
+pub(crate) trait Record: Serialize {
+    /// What stands under the heading; nothing where there is no answer.
+    fn table(&self, focal_length: Option<f64>) -> Option<String>;
+
+    /// The rows of the pair with this number, counted from one; the first one brings the header.
+    fn write_csv(&self, writer: &mut dyn Write, pair: usize) -> io::Result<()>;
+}
+
+/// Writes the results of pairs as they come.
+pub(crate) struct Writer<R> {
+    output: Output,
+    format: Format,
+    /// How many results there were.
+    pairs: usize,
+    /// The results of `--format json`, which are one value.
+    kept: Vec<R>,
+}
+
+impl<R: Record> Writer<R> {
+    pub(crate) fn open(options: &OutputOptions, is_lines: bool) -> Result<Self, WriteError> {
+        let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
+        Ok(Self { output: options.open()?, format, pairs: 0, kept: Vec::new() })
+    }
+
+    pub(crate) fn write(
+        &mut self,
+        heading: &str,
+        record: R,
+        focal_length: Option<f64>,
+    ) -> Result<(), WriteError> {
+        self.pairs += 1;
+        let is_first = self.pairs == 1;
+        match self.format {
+            Format::Json => {
+                self.kept.push(record);
+                Ok(())
+            }
+            Format::Jsonl => self.output.write(|w| rows::write_line(w, &record)),
+            Format::Csv => self.output.write(|w| record.write_csv(w, self.pairs)),
+            Format::Table => self.output.write(|w| {
+                writeln!(w, "{}{heading}", if is_first { "" } else { "\n" })?;
+                record.table(focal_length).map_or(Ok(()), |table| writeln!(w, "\n{table}"))
+            }),
+        }
+    }
+
+    /// One pair is one JSON object, JSON Lines are a list of them.
+    pub(crate) fn finish(mut self, is_list: bool) -> Result<(), WriteError> {
+        if self.format == Format::Json {
+            let kept = &self.kept;
+            self.output.write(|w| match kept.as_slice() {
+                [one] if !is_list => quest_io::write_json(w, one),
+                all => quest_io::write_json(w, all),
+            })?;
+        }
+        self.output.finish()
+    }
+}

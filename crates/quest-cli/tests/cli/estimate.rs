@@ -1,0 +1,159 @@
+//! The answers of `estimate`.
+
+use serde_json::{Value, json};
+
+use super::*;
+
+/// Matches of a camera that moves by `t_21` past points in space; every third is false where `outliers`.
+fn pair(t_21: [f64; 3], count: u32, outliers: bool) -> Value {
+    let matches: Vec<_> = (0..count)
+        .map(|i| {
+            // A lattice without planes: multiples of irrational numbers.
+            let f = |a: f64| (f64::from(i) * a).fract() - 0.5;
+            let x1 = [2.0 * f(0.618_034), 2.0 * f(0.754_878), 4.0 + f(0.569_840) * 2.0];
+            let x2 = [x1[0] + t_21[0], x1[1] + t_21[1], x1[2] + t_21[2]];
+            let pixel = |x: [f64; 3]| [1000.0 * x[0] / x[2] + 500.0, 1000.0 * x[1] / x[2] + 400.0];
+            let (u1, u2) = (pixel(x1), pixel(x2));
+            if outliers && i % 3 == 0 {
+                let noise = |a: f64| ((f64::from(i) * a).sin() * 43_758.545).rem_euclid(1.0);
+                return [
+                    1000.0 * noise(12.9),
+                    800.0 * noise(78.2),
+                    1000.0 * noise(37.7),
+                    800.0 * noise(93.1),
+                ];
+            }
+            [u1[0], u1[1], u2[0], u2[1]]
+        })
+        .collect();
+    json!({
+        "camera1": {"model": "PINHOLE", "width": 1000, "height": 800, "params": [1000, 1000, 500, 400]},
+        "matches": matches, "q_21": [1, 0, 0, 0], "t_21": t_21,
+    })
+}
+
+fn estimated(pair: &Value, arguments: &[&str]) -> (Run, Value) {
+    let all = [&["estimate", "-", "--format", "json"], arguments].concat();
+    let run = run_in(Path::new("."), &all, pair.to_string().as_bytes());
+    let result = serde_json::from_str(&run.stdout).unwrap_or_default();
+    (run, result)
+}
+
+#[test]
+fn a_planted_pose_is_found_among_outliers() {
+    let (run, result) = estimated(&pair([0.5, 0.1, -0.2], 90, true), &[]);
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    let number = |key: &str| result[key].as_f64().unwrap();
+    assert!(number("rotation_error_deg") < 1e-6 && number("translation_error_deg") < 1e-6);
+    assert_eq!(result["model"], "general");
+    let inliers = result["inliers"].as_array().unwrap();
+    assert_eq!(inliers.len(), 90);
+    assert_eq!(number("inlier_count"), inliers.iter().filter(|i| **i == json!(true)).count() as f64);
+    assert!((60.0..66.0).contains(&number("inlier_count")));
+    assert!(number("parallax") > 0.1 && number("score") > 0.6 && number("iterations") >= 1.0);
+    assert_eq!(result["covariance"].as_array().map(Vec::len), Some(6));
+    assert!(result["evidence"]["rotation_px"].as_f64() > result["evidence"]["general_px"].as_f64());
+    assert_eq!(result["runner_up"], Value::Null);
+    assert!(number("elapsed_ms") > 0.0);
+}
+
+#[test]
+fn the_keys_are_those_of_the_interface() {
+    let (_, result) = estimated(&pair([0.5, 0.1, -0.2], 60, false), &[]);
+    let keys: Vec<_> = result.as_object().unwrap().keys().map(String::as_str).collect();
+    let all = "model q_21 R_21 t_21 parallax covariance inliers inlier_count score iterations runner_up evidence elapsed_ms \
+               rotation_error_deg translation_error_deg";
+    assert!(all.split(' ').all(|key| keys.contains(&key)), "{keys:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_answer() {
+    let answer = |seed: &str| {
+        let (_, mut result) = estimated(&pair([0.5, 0.1, -0.2], 60, true), &["--seed", seed]);
+        result.as_object_mut().unwrap().remove("elapsed_ms");
+        result
+    };
+    assert_eq!(answer("3"), answer("3"));
+}
+
+#[test]
+fn a_turn_in_place_has_no_translation() {
+    let (run, result) = estimated(&pair([0.0; 3], 60, true), &[]);
+    assert_eq!((run.status, &result["model"]), (0, &json!("pure_rotation")));
+    assert!(result["parallax"].as_f64().unwrap() < 1e-6);
+}
+
+#[test]
+fn false_matches_have_no_pose() {
+    let mut false_ones = pair([0.5, 0.1, -0.2], 120, true);
+    let all = false_ones["matches"].as_array().unwrap();
+    false_ones["matches"] = all.iter().step_by(3).cloned().collect();
+    let (run, result) = estimated(&false_ones, &["--max-iterations", "2000"]);
+    assert_eq!((run.status, &result["model"]), (1, &Value::Null));
+    assert!(run.stderr.starts_with("no pose: standard input: no pose could be found"), "{}", run.stderr);
+    assert!(result["reason"].as_str().unwrap().contains("of 40 matches"));
+}
+
+#[test]
+fn lines_are_answered_one_by_one() {
+    let mut wrong = pair([0.5, 0.1, -0.2], 120, true);
+    wrong["matches"] = wrong["matches"].as_array().unwrap().iter().step_by(3).cloned().collect();
+    let right = pair([0.5, 0.1, -0.2], 60, false);
+    let lines = format!("{right}\n{wrong}\n{right}\n");
+    let arguments = ["estimate", "-", "--max-iterations", "1000"];
+    let run = run_in(Path::new("."), &arguments, lines.as_bytes());
+    let models: Vec<_> = run
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap()["model"].clone())
+        .collect();
+    assert_eq!(models, [json!("general"), Value::Null, json!("general")]);
+    assert_eq!((run.status, run.stderr.lines().count()), (1, 1));
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let mut four = pair([0.5, 0.1, -0.2], 4, false);
+    let (run, _) = estimated(&four, &[]);
+    assert_eq!(run.status, 2);
+    assert!(run.stderr.contains("found 4 matches, expected at least 5"), "{}", run.stderr);
+
+    four = pair([0.5, 0.1, -0.2], 20, false);
+    for (arguments, word) in [
+        (["--threshold", "-1"], "threshold is -1"),
+        (["--threshold", "NaN"], "threshold is NaN"),
+        (["--confidence", "1"], "confidence is 1"),
+        (["--max-iterations", "0"], "iterations"),
+        (["--solver", "orb"], "orb"),
+    ] {
+        let (run, _) = estimated(&four, &arguments);
+        assert_eq!((run.status, run.stdout.as_str()), (2, ""), "{arguments:?}");
+        assert!(run.stderr.contains(word), "{arguments:?}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn points_without_cameras_need_a_threshold() {
+    let arguments = ["estimate", &example("points.csv")];
+    let refused = run(&arguments);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("--threshold"), "{}", refused.stderr);
+    let found = run(&[&arguments[..], &["--threshold", "0.001"]].concat());
+    assert_eq!((found.status, found.stderr.as_str()), (0, ""));
+    // Five matches have more than one pose.
+    assert!(found.stdout.contains("runner-up") && found.stdout.contains("z = 1"), "{}", found.stdout);
+}
+
+#[test]
+fn tables_and_rows() {
+    let text = pair([0.5, 0.1, -0.2], 60, true).to_string();
+    let with = |format: &str| run_in(Path::new("."), &["estimate", "-", "--format", format], text.as_bytes());
+    let table = with("table");
+    assert!(table.stdout.starts_with("standard input: 60 matches, "), "{}", table.stdout);
+    assert!(table.stdout.contains("general") && table.stdout.contains("noise"));
+    let csv = with("csv");
+    let rows: Vec<_> = csv.stdout.lines().collect();
+    assert_eq!(rows.len(), 2);
+    assert_eq!(rows[0].split(',').count(), rows[1].split(',').count());
+    assert!(rows[0].starts_with("pair,name,model,qw"));
+}

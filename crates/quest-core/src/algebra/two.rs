@@ -1,0 +1,70 @@
+//! Two numbers side by side, as the registers of every x86-64 and AArch64 processor hold them: loops over matches take two at
+//! a time. Arrays that the compiler could have put there it does not.
+
+use std::array::from_fn;
+
+use nalgebra::{Matrix3, Vector3};
+pub(crate) use wide::f64x2 as Two;
+
+/// Two vectors.
+pub(crate) type TwoVectors = [Two; 3];
+
+/// Two vectors side by side; the second is zero where there is none.
+#[inline]
+pub(crate) fn side_by_side(first: &Vector3<f64>, second: Option<&Vector3<f64>>) -> TwoVectors {
+    match second {
+        Some(second) => from_fn(|k| Two::new([first[k], second[k]])),
+        None => from_fn(|k| Two::new([first[k], 0.0])),
+    }
+}
+
+/// The same vector twice.
+#[inline]
+pub(crate) fn both(v: &Vector3<f64>) -> TwoVectors {
+    from_fn(|k| Two::splat(v[k]))
+}
+
+#[inline]
+pub(crate) fn cross(x: &TwoVectors, y: &TwoVectors) -> TwoVectors {
+    [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+}
+
+#[inline]
+pub(crate) fn dot(x: &TwoVectors, y: &TwoVectors) -> Two {
+    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+}
+
+/// A matrix times two vectors.
+#[inline]
+pub(crate) fn times(m: &Matrix3<f64>, v: &TwoVectors) -> TwoVectors {
+    from_fn(|i| Two::splat(m[(i, 0)]) * v[0] + Two::splat(m[(i, 1)]) * v[1] + Two::splat(m[(i, 2)]) * v[2])
+}
+
+/// In how many of the two a comparison holds.
+#[inline]
+pub(crate) fn count(mask: Two) -> usize {
+    let bits = mask.to_bitmask();
+    (bits & 1) as usize + (bits >> 1) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operations_act_on_each() {
+        let (x, y) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.25, 3.0, -1.0));
+        let pair = side_by_side(&x, Some(&y));
+        let m = Matrix3::from_fn(|i, j| (3 * i + j) as f64 - 3.5);
+        let [product, crossed] = [times(&m, &pair), cross(&pair, &both(&y))];
+        for (lane, v) in [x, y].iter().enumerate() {
+            let at = |u: &TwoVectors| Vector3::from_fn(|k, _| u[k].to_array()[lane]);
+            assert!((at(&product) - m * v).norm() < 1e-14);
+            assert!((at(&crossed) - v.cross(&y)).norm() < 1e-15);
+            assert!((dot(&pair, &product).to_array()[lane] - v.dot(&(m * v))).abs() < 1e-14);
+        }
+        assert_eq!(side_by_side(&x, None)[0].to_array(), [1.0, 0.0]);
+        assert_eq!([0, 1, 2].map(|k| count(pair[k].simd_gt(Two::splat(0.5)))), [1, 1, 0]);
+        assert_eq!(count(pair[2].simd_gt(Two::splat(-2.0))), 2);
+    }
+}

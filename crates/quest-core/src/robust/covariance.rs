@@ -1,0 +1,103 @@
+//! The covariance of a pose, from the normal equations of its last refinement.
+//!
+//! To first order the refinement's result is off by `A⁻¹ Σ ψ(r) J` with `A = Σ ψ'(r) J Jᵀ`; so its covariance is `A⁻¹ B A⁻¹`,
+//! `B = Σ ψ(r)² J Jᵀ` (the sandwich of P. J. Huber, *The behavior of maximum likelihood estimates under nonstandard conditions*, 1967).
+//! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
+
+use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, SVector, UnitQuaternion, Vector5};
+
+use super::length::{Length, length};
+use super::loss::{GemanMcClure, Truncated};
+use super::observations::Observations;
+use super::polish::SCALE;
+use super::refine::Subset;
+use super::transfer::rotation_hessian;
+use crate::epipolar_frame::tangent_basis;
+use crate::solver::motion::Motion;
+
+/// Parameters of a motion.
+const PARAMETERS: f64 = 5.0;
+
+/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with the loss of Geman and
+/// McClure at three standard deviations.
+const EFFICIENCY: f64 = 1.10;
+
+/// Steps of the numerical derivatives of the length, in radians.
+const STEP: f64 = 1e-5;
+
+/// Matches that the derivatives of the length are taken over.
+const ENOUGH: usize = 200;
+
+/// The covariance of the five parameters of a motion, `sigma` the noise in pixels.
+fn of_motion(
+    observations: &Observations,
+    motion: &Motion,
+    inliers: &[u32],
+    sigma: f64,
+) -> Option<Matrix5<f64>> {
+    let _ = (PARAMETERS, GemanMcClure::new(SCALE * sigma));
+    let subset = Subset::new(observations, inliers);
+    let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));
+    let inverse = equations.hessian.cholesky()?.inverse();
+    Some(inverse * (EFFICIENCY * sigma * sigma))
+}
+
+/// The covariance of `(ω, t_21)` of a motion whose translation has this length.
+pub(super) fn of_pose(
+    observations: &Observations,
+    motion: &Motion,
+    inliers: &[u32],
+    sigma: f64,
+    size: Length,
+) -> Option<Matrix6<f64>> {
+    let five = of_motion(observations, motion, inliers, sigma)?;
+    let tangent = tangent_basis(&motion.direction);
+    // The derivatives of the length hardly need all of the matches.
+    let some = &inliers[..inliers.len().min(ENOUGH)];
+    let slope = Vector5::from_fn(|k, _| {
+        let at = |step: f64| {
+            let mut steps = [0.0; 5];
+            steps[k] = step;
+            length(observations, &motion.stepped(&tangent, &steps), some, sigma).value
+        };
+        (at(STEP) - at(-STEP)) / (2.0 * STEP)
+    });
+    let mut jacobian = SMatrix::<f64, 6, 5>::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+    for k in 0..5 {
+        let mut column = motion.direction * slope[k];
+        if k >= 3 {
+            column += tangent[k - 3] * size.value;
+        }
+        jacobian.fixed_view_mut::<3, 1>(3, k).copy_from(&column);
+    }
+    let mut covariance = jacobian * five * jacobian.transpose();
+    let along = motion.direction * motion.direction.transpose() * size.variance;
+    let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
+    block += along;
+    // Rounding must not show which triangle it was computed from.
+    Some((covariance + covariance.transpose()) * 0.5)
+}
+
+/// The covariance of `(ω, t_21)` where there is no translation: that of the rotation alone, and for a translation of which
+/// only the length is known to be small, its square in every direction.
+pub(super) fn of_rotation(
+    observations: &Observations,
+    q_21: &UnitQuaternion<f64>,
+    inliers: &[u32],
+    sigma: f64,
+    size: Length,
+) -> Option<Matrix6<f64>> {
+    let rotation =
+        rotation_hessian(&observations.framed(inliers), q_21).cholesky()?.inverse() * (sigma * sigma);
+    let mut covariance = Matrix6::zeros();
+    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    let any = Matrix3::identity() * (size.value * size.value + size.variance);
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
+    Some(covariance)
+}
+
+/// What stands where the matches leave some direction open: so large that nothing is excluded.
+pub(super) fn unknown() -> Matrix6<f64> {
+    Matrix6::from_diagonal(&SVector::from([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]))
+}

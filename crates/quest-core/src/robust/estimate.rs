@@ -1,0 +1,84 @@
+//! What an estimate says.
+
+use nalgebra::Matrix6;
+
+use crate::RelativePose;
+
+/// Which model of the scene and the motion the matches support.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Model {
+    /// Points in space, a translation.
+    General,
+    /// Points on a plane, a translation: there may be a second pose.
+    Planar,
+    /// No translation that stands clear of the noise. The rotation is right; the translation is the small vector that is left,
+    /// of no meaning where it is within its covariance.
+    PureRotation,
+    /// The matches leave a whole family of poses; the one given is a member of it.
+    Degenerate,
+}
+
+impl Model {
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::General => "general",
+            Self::Planar => "planar",
+            Self::PureRotation => "pure_rotation",
+            Self::Degenerate => "degenerate",
+        }
+    }
+}
+
+/// Another pose that the matches may mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunnerUp {
+    /// The pose, in a scale of its own: its mean absolute depth is one as well.
+    pub pose: RelativePose,
+    /// As [`Estimate::score`].
+    pub score: f64,
+    /// Matches within the threshold and in front of both cameras.
+    pub inlier_count: usize,
+}
+
+/// How far off the inliers are under each model: the median residual in pixels of the focal lengths.
+///
+/// A rotation and a plane take a point to a point, which leaves two numbers a match; the essential matrix takes it to
+/// a line, which leaves one. So even a true plane has a larger median than the general model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    /// Under the best rotation without translation.
+    pub rotation_px: f64,
+    /// Under the best plane; infinite where none was found.
+    pub planar_px: f64,
+    /// Under the essential matrix.
+    pub general_px: f64,
+}
+
+/// One pose from matches with outliers, and what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Which model the matches support.
+    pub model: Model,
+    /// The pose. The mean absolute depth of the inliers over both views is one, so that `|t_21|` is the parallax.
+    pub pose: RelativePose,
+    /// Covariance of `(ω, t_21)`: the rotation vector in radians of the error `exp([ω]×) R_21`, in the frame of camera 2, and
+    /// the translation.
+    pub covariance: Matrix6<f64>,
+    /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order.
+    pub inliers: Vec<bool>,
+    /// How many of them there are.
+    pub inlier_count: usize,
+    /// How well the pose explains all matches, from zero to one.
+    pub score: f64,
+    /// Samples drawn.
+    pub iterations: usize,
+    /// The pose that explains the matches nearly as well, where there is one.
+    pub runner_up: Option<RunnerUp>,
+    /// How well each model fits.
+    pub evidence: Evidence,
+    /// The standard deviation of the inliers' Sampson errors, in pixels of the focal lengths.
+    pub noise_px: f64,
+}

@@ -1,0 +1,132 @@
+//! One honest pose from matches with outliers.
+//!
+//! ```
+//! use quest_core::robust::{self, Options};
+//! use quest_core::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
+//!
+//! let options = SceneOptions { points: 100, noise_px: 0.5, ..SceneOptions::realistic() };
+//! let scene = Scene::generate(&options, 2018, 1)?;
+//! let focal_lengths = [[FOCAL_LENGTH; 2]; 2];
+//! let options = Options { threshold: 1.5, focal_lengths, ..Options::default() };
+//! let estimate = robust::estimate(&scene.matches, &options)?;
+//! assert!(estimate.pose.rotation_error(&scene.truth) < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Steps
+//! 1. The matches are permuted once and written in columns of pixels (`observations`).
+//! 2. Random samples are solved, their essential matrices scored over all matches and dropped as soon as they are
+//!    most likely worse than the best (`sampling`, `score`); the best are scored as poses, with the depths of their points
+//!    (`pose_score`), and refined over their inliers (`search`), until enough samples have been drawn (`stopping`).
+//! 3. The best pose is refined over all of its inliers with the noise that they show (`polish`, `refine`, `noise`).
+//! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`plane`).
+//! 5. Whether chance explains the inliers (`significance`), and which model they support (`model`).
+//! 6. The length of the translation and the covariance (`length`, `covariance`).
+//!
+//! # Noise
+//! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
+//! as fisheye cameras do, the same angle. Residuals are Sampson errors in pixels of the focal lengths.
+
+mod batch;
+mod covariance;
+mod estimate;
+mod length;
+mod loss;
+mod model;
+mod noise;
+mod observations;
+mod options;
+mod plane;
+mod polish;
+mod pose_score;
+mod refine;
+mod sampling;
+mod score;
+mod search;
+mod significance;
+mod stopping;
+#[cfg(test)]
+mod tests;
+mod transfer;
+mod verdict;
+
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+pub use batch::{Problem, estimate_batch};
+pub use estimate::{Estimate, Evidence, Model, RunnerUp};
+pub use options::{EstimateError, KnownDirection, Options, Priors};
+
+use crate::degeneracy::diagnose;
+use crate::solver::motion::Motion;
+use crate::{Correspondence, InputError};
+use observations::Observations;
+use sampling::Sampler;
+use search::{Limits, Search};
+
+/// Fewer matches than this have no pose.
+pub const MIN_MATCHES: usize = 5;
+
+/// Matches that are looked at for the reason why there is no hypothesis.
+const DIAGNOSED: usize = 300;
+
+/// The pose that most of the matches agree with, and what is known of it.
+///
+/// # Errors
+/// [`EstimateError::Option`] for an impossible option, [`EstimateError::Input`] for fewer than [`MIN_MATCHES`] matches (or
+/// than the solver takes) and for matches that determine no pose, [`EstimateError::NoPose`] where the best pose
+/// agrees with no more matches than chance explains. With fewer than ten matches the best pose is always returned.
+pub fn estimate(matches: &[Correspondence], options: &Options) -> Result<Estimate, EstimateError> {
+    estimate_with(matches, options, &Priors::default())
+}
+
+/// As [`estimate`], with what is known beside the matches.
+///
+/// # Errors
+/// Those of [`estimate`], and [`EstimateError::Option`] for a prior that is not finite.
+pub fn estimate_with(
+    matches: &[Correspondence],
+    options: &Options,
+    priors: &Priors,
+) -> Result<Estimate, EstimateError> {
+    options.check()?;
+    priors.check(matches.len())?;
+    let needed = options.solver.info().min_matches.max(MIN_MATCHES);
+    if matches.len() < needed {
+        return Err(InputError::TooFewMatches { found: matches.len(), needed }.into());
+    }
+    let mut rng = sampling::generator(options.seed);
+    let mut order: Vec<usize> = (0..matches.len()).collect();
+    order.shuffle(&mut rng);
+    let observations = Observations::new(matches, order, options.focal_lengths);
+    let mut search = search(&observations, options, priors, rng.clone());
+    let Some(best) = search.best else {
+        let reason = diagnose(&observations.matches[..matches.len().min(DIAGNOSED)]);
+        return Err(InputError::Degenerate(reason).into());
+    };
+    verdict::conclude(&mut search, best, &mut rng)
+}
+
+/// Steps 1 and 2: the best pose that samples lead to.
+fn search<'a>(
+    observations: &'a Observations,
+    options: &Options,
+    priors: &Priors,
+    rng: ChaCha8Rng,
+) -> Search<'a> {
+    let mut search = Search::new(observations, options.solver, options.threshold, priors.direction);
+    if let Some(pose) = priors.pose
+        && let Some(direction) = pose.t_21.try_normalize(0.0)
+    {
+        search.consider_pose(Motion { q_21: pose.q_21, direction });
+    }
+    let size = options.solver.info().min_matches;
+    let mut sampler = Sampler::new(rng, observations.len(), size, priors.ranked(observations));
+    let limits = Limits {
+        confidence: options.confidence,
+        min_iterations: options.min_iterations,
+        max_iterations: options.max_iterations,
+    };
+    search.run(&mut sampler, &limits);
+    search
+}

@@ -1,0 +1,200 @@
+//! The matches as the search reads them: permuted, in columns, in pixels.
+//!
+//! A match is `x2ᵀ F x1 = 0` with `x` in pixels: `x = (fx u, fy v, 1)` for points on the plane `z = 1`, whose noise is that
+//! of a flat image, and `x = f a` for unit bearings, whose noise is that of a sphere. `F = D2 E D1` brings an essential
+//! matrix there. The Sampson error, in pixels, is
+//!
+//! ```text
+//! r = e / √(|∂e/∂x1|² + |∂e/∂x2|²),   e = x2ᵀ F x1
+//! ```
+//!
+//! with the gradients in the plane of the image, or in the tangent plane of the sphere.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Correspondence;
+use crate::epipolar_frame::tangent_basis;
+
+/// How a match as it was given lies on the plane `z = 1`: rounding.
+const ON_PLANE: f64 = 1e-9;
+
+/// Where the noise of a view lives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Image {
+    /// On the plane `z = 1`, with the focal lengths in pixels.
+    Plane([f64; 2]),
+    /// On the sphere, with the pixels in a radian.
+    Sphere(f64),
+}
+
+/// An image around one of its points: `e` takes a vector to pixels, `n` is what it is divided by, `d` takes pixels back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub(super) e: [Vector3<f64>; 2],
+    pub(super) n: Vector3<f64>,
+    pub(super) d: [Vector3<f64>; 2],
+}
+
+/// A match as vectors, with the frames of both views around them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FramedMatch {
+    pub(super) x1: Vector3<f64>,
+    pub(super) x2: Vector3<f64>,
+    pub(super) frame1: Frame,
+    pub(super) frame2: Frame,
+}
+
+/// The matches of one estimate.
+#[derive(Debug)]
+pub(super) struct Observations {
+    /// The matches in random order.
+    pub(super) matches: Vec<Correspondence>,
+    /// Where each of them stands in the caller's order.
+    pub(super) order: Vec<usize>,
+    /// The two views, both planes or both spheres.
+    pub(super) images: [Image; 2],
+    /// `x1` and `x2`, six columns.
+    columns: [Vec<f64>; 6],
+}
+
+impl Observations {
+    /// The matches in this order, with the focal lengths of both views.
+    pub(super) fn new(given: &[Correspondence], order: Vec<usize>, focal_lengths: [[f64; 2]; 2]) -> Self {
+        let matches: Vec<_> = order.iter().map(|&i| given[i]).collect();
+        let is_plane = matches.iter().all(|m| {
+            let off = |z: f64, length: f64| (z * length - 1.0).abs() < ON_PLANE;
+            off(m.bearing1().z, m.length1()) && off(m.bearing2().z, m.length2())
+        });
+        let images = focal_lengths
+            .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
+        Self::in_images(matches, order, images)
+    }
+
+    /// Other matches in the same images.
+    pub(super) fn with_matches(&self, matches: Vec<Correspondence>) -> Self {
+        let order = (0..matches.len()).collect();
+        Self::in_images(matches, order, self.images)
+    }
+
+    fn in_images(matches: Vec<Correspondence>, order: Vec<usize>, images: [Image; 2]) -> Self {
+        let mut columns: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(matches.len()));
+        for m in &matches {
+            let x1 = images[0].scaled(m.bearing1());
+            let x2 = images[1].scaled(m.bearing2());
+            for (column, x) in columns.iter_mut().zip(x1.iter().chain(x2.iter())) {
+                column.push(*x);
+            }
+        }
+        Self { matches, order, images, columns }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.matches.len()
+    }
+
+    pub(super) fn is_sphere(&self) -> bool {
+        matches!(self.images[0], Image::Sphere(_))
+    }
+
+    /// `F = D2 E D1`, of unit norm.
+    pub(super) fn fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
+        self.unscaled_fundamental(e).normalize()
+    }
+
+    /// `F = D2 E D1`.
+    pub(super) fn unscaled_fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
+        let [d1, d2] = self.images.map(Image::inverse_scale);
+        Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j])
+    }
+
+    /// The six columns.
+    pub(super) fn columns(&self) -> &[Vec<f64>; 6] {
+        &self.columns
+    }
+
+    /// The curvature of the images: `1/f²` on a sphere, zero on a plane.
+    pub(super) fn curvature(&self) -> [f64; 2] {
+        self.images.map(|image| match image {
+            Image::Plane(_) => 0.0,
+            Image::Sphere(f) => 1.0 / (f * f),
+        })
+    }
+
+    /// The squared angle, in radians, that a pixel in both views stands for.
+    pub(super) fn square_angle_of_pixel(&self) -> f64 {
+        self.images.iter().map(|image| 1.0 / image.square_focal_length()).sum()
+    }
+
+    /// A match as vectors on the planes `z = 1`, or as unit bearings.
+    pub(super) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
+        let m = &self.matches[index];
+        let (a, b) = (m.bearing1(), m.bearing2());
+        if self.is_sphere() { [*a, *b] } else { [a / a.z, b / b.z] }
+    }
+
+    /// Some of the matches with the frames of both views.
+    pub(super) fn framed(&self, indices: &[u32]) -> Vec<FramedMatch> {
+        let framed = |&index: &u32| {
+            let [x1, x2] = self.vectors(index as usize);
+            FramedMatch { x1, x2, frame1: self.images[0].frame(&x1), frame2: self.images[1].frame(&x2) }
+        };
+        indices.iter().map(framed).collect()
+    }
+
+    /// The signed Sampson error of every match in pixels.
+    pub(super) fn residuals(&self, e: &Matrix3<f64>, out: &mut Vec<f64>) {
+        let f = self.fundamental(e);
+        let curvature = self.curvature();
+        out.clear();
+        let [x1, y1, z1, x2, y2, z2] = &self.columns;
+        let is_sphere = self.is_sphere();
+        out.extend((0..self.len()).map(|i| {
+            let (x1, x2) = (Vector3::new(x1[i], y1[i], z1[i]), Vector3::new(x2[i], y2[i], z2[i]));
+            let (l, m) = (f * x1, f.tr_mul(&x2));
+            let e = x2.dot(&l);
+            let mut square = l.xy().norm_squared() + m.xy().norm_squared();
+            if is_sphere {
+                square += l.z * l.z + m.z * m.z - e * e * (curvature[0] + curvature[1]);
+            }
+            // At an epipole both vanish: no point there contradicts the motion.
+            e / square.max(f64::MIN_POSITIVE).sqrt()
+        }));
+    }
+}
+
+impl Image {
+    fn scaled(self, b: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Plane([fx, fy]) => Vector3::new(fx * b.x / b.z, fy * b.y / b.z, 1.0),
+            Self::Sphere(f) => b * f,
+        }
+    }
+
+    fn inverse_scale(self) -> [f64; 3] {
+        match self {
+            Self::Plane([fx, fy]) => [1.0 / fx, 1.0 / fy, 1.0],
+            Self::Sphere(f) => [1.0 / f; 3],
+        }
+    }
+
+    fn square_focal_length(self) -> f64 {
+        match self {
+            Self::Plane([fx, fy]) => fx * fy,
+            Self::Sphere(f) => f * f,
+        }
+    }
+
+    fn frame(self, b: &Vector3<f64>) -> Frame {
+        match self {
+            Self::Plane([fx, fy]) => Frame {
+                e: [Vector3::x() * fx, Vector3::y() * fy],
+                n: Vector3::z(),
+                d: [Vector3::x() / fx, Vector3::y() / fy],
+            },
+            Self::Sphere(f) => {
+                let tangent = tangent_basis(b);
+                Frame { e: tangent.map(|e| e * f), n: *b, d: tangent.map(|e| e / f) }
+            }
+        }
+    }
+}

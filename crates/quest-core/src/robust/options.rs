@@ -1,0 +1,180 @@
+//! What an estimate can be told.
+
+use nalgebra::Vector3;
+
+use super::observations::Observations;
+use crate::solver::SolverName;
+use crate::{Camera, InputError, RelativePose};
+
+/// How an estimate is made. The defaults suit most pairs; the threshold has to be in the unit of the focal lengths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Matches whose Sampson error is below this are inliers, in pixels of [`focal_lengths`](Self::focal_lengths).
+    pub threshold: f64,
+    /// `fx, fy` of view 1 and of view 2, in pixels. With all of them 1 the threshold is in units of the plane `z = 1`, or
+    /// in radians for bearings.
+    pub focal_lengths: [[f64; 2]; 2],
+    /// How sure the search is to be that it has seen a good sample before it stops, in `(0, 1)`.
+    pub confidence: f64,
+    /// At least so many samples are drawn.
+    pub min_iterations: usize,
+    /// At most so many samples are drawn.
+    pub max_iterations: usize,
+    /// The same seed gives the same answer, bit for bit.
+    pub seed: u64,
+    /// The solver of the samples; it decides how many matches a sample has.
+    pub solver: SolverName,
+}
+
+impl Default for Options {
+    /// A threshold of a thousandth of the focal length, a confidence of 0.9999, from 300 to 100,000 iterations.
+    fn default() -> Self {
+        Self {
+            threshold: 1e-3,
+            focal_lengths: [[1.0; 2]; 2],
+            confidence: 0.9999,
+            min_iterations: 300,
+            max_iterations: 100_000,
+            seed: 0,
+            solver: SolverName::default(),
+        }
+    }
+}
+
+impl Options {
+    /// The defaults with a threshold in pixels of these cameras.
+    #[must_use]
+    pub fn in_pixels(threshold: f64, camera1: &Camera, camera2: &Camera) -> Self {
+        Self { threshold, ..Self::default() }.with_cameras(camera1, camera2)
+    }
+
+    /// These options with the focal lengths of these cameras.
+    #[must_use]
+    pub fn with_cameras(self, camera1: &Camera, camera2: &Camera) -> Self {
+        let focal_lengths = [camera1, camera2].map(|camera| camera.focal_lengths().into());
+        Self { focal_lengths, ..self }
+    }
+
+    pub(super) fn check(&self) -> Result<(), EstimateError> {
+        let refuse = |option, found, expected| Err(EstimateError::Option { option, found, expected });
+        if !(self.threshold > 0.0 && self.threshold.is_finite()) {
+            return refuse("threshold", self.threshold, "a positive finite number");
+        }
+        for found in self.focal_lengths.into_iter().flatten() {
+            if !(found > 0.0 && found.is_finite()) {
+                return refuse("focal length", found, "a positive finite number");
+            }
+        }
+        if !(self.confidence > 0.0 && self.confidence < 1.0) {
+            return refuse("confidence", self.confidence, "a number above 0 and below 1");
+        }
+        if self.max_iterations == 0 {
+            return refuse("largest number of iterations", 0.0, "at least 1");
+        }
+        Ok(())
+    }
+}
+
+/// What is known beside the matches.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Priors<'a> {
+    /// One a match, higher is better: samples are drawn from the best matches first.
+    pub scores: Option<&'a [f64]>,
+    /// A pose to begin with; the length of its translation plays no part.
+    pub pose: Option<RelativePose>,
+    /// A direction that both cameras know.
+    pub direction: Option<KnownDirection>,
+}
+
+/// A direction in space that both cameras know: gravity, or the axis about which a robot turns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownDirection {
+    /// In the frame of camera 1; of any length.
+    pub in_view1: Vector3<f64>,
+    /// In the frame of camera 2; the same as in view 1 for the axis of the rotation.
+    pub in_view2: Vector3<f64>,
+    /// Poses that turn the first further than this from the second, in radians, are not considered.
+    pub tolerance: f64,
+}
+
+impl KnownDirection {
+    /// Whether a rotation takes the direction from view 1 to view 2.
+    pub(super) fn allows(&self, q_21: &nalgebra::UnitQuaternion<f64>) -> bool {
+        let turned = q_21 * self.in_view1;
+        turned.cross(&self.in_view2).norm().atan2(turned.dot(&self.in_view2)) <= self.tolerance
+    }
+}
+
+/// Why there is no estimate.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimateError {
+    /// The matches were refused.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// An option or a prior is impossible.
+    #[error("the {option} is {found}, expected {expected}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// What was found.
+        found: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// No pose explains more of the matches than chance would.
+    #[error(
+        "no pose could be found: the best one agrees with {inliers} of {matches} matches within the threshold, which \
+         chance explains"
+    )]
+    NoPose {
+        /// Matches that agree with the best pose.
+        inliers: usize,
+        /// All matches.
+        matches: usize,
+    },
+}
+
+impl Priors<'_> {
+    pub(super) fn check(&self, matches: usize) -> Result<(), EstimateError> {
+        let refuse = |option, found, expected| Err(EstimateError::Option { option, found, expected });
+        if let Some(scores) = self.scores {
+            if scores.len() != matches {
+                let found = scores.len() as f64;
+                return refuse("number of scores", found, "one a match");
+            }
+            if let Some(&found) = scores.iter().find(|s| !s.is_finite()) {
+                return refuse("score of a match", found, "a finite number");
+            }
+        }
+        if let Some(pose) = self.pose {
+            let all = pose.t_21.iter().chain(pose.q_21.coords.iter());
+            if let Some(&found) = all.copied().find(|x| !x.is_finite()).as_ref() {
+                return refuse("initial pose", found, "finite numbers");
+            }
+        }
+        if let Some(KnownDirection { in_view1, in_view2, tolerance }) = self.direction {
+            for length in [in_view1.norm(), in_view2.norm()] {
+                if !(length > 0.0 && length.is_finite()) {
+                    return refuse("length of the known direction", length, "a positive finite number");
+                }
+            }
+            if tolerance.is_nan() || tolerance < 0.0 {
+                return refuse(
+                    "tolerance of the known direction",
+                    tolerance,
+                    "a number that is not negative",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// The matches as observations, from the best to the worst.
+    pub(super) fn ranked(&self, observations: &Observations) -> Option<Vec<usize>> {
+        let scores = self.scores?;
+        let mut ranked: Vec<usize> = (0..observations.len()).collect();
+        ranked.sort_by(|&i, &j| scores[observations.order[j]].total_cmp(&scores[observations.order[i]]));
+        Some(ranked)
+    }
+}

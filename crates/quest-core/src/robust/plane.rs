@@ -1,0 +1,103 @@
+//! The plane that most of the points lie near, and the two motions that explain it.
+//!
+//! Points on a plane have two motions, and the essential cost hardly tells one from the other: a search that has settled on
+//! the wrong one does not find its way back. So the plane is fitted to the depths of the pose that was found, its
+//! homography `H = R + t gᵀ` is refined on its own, and both of its motions are given back. That also helps where the points
+//! only come close to a plane.
+
+use nalgebra::{Matrix3, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::loss::GemanMcClure;
+use super::observations::Observations;
+use super::polish::SCALE;
+use super::transfer::refine_homography;
+use crate::solver::homography;
+use crate::solver::motion::Motion;
+
+/// Samples of three points.
+const SAMPLES: usize = 60;
+
+/// Points that a sample is judged by, and that the homography is refined over.
+const JUDGES: usize = 120;
+
+/// The 99 % quantile of χ² with two degrees of freedom: what a match counts at most.
+pub(super) const CAP: f64 = 9.21;
+
+/// Steps of the refinement.
+const STEPS: usize = 8;
+
+/// A plane seen from both cameras.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// `x2 ∝ H x1`.
+    pub(super) homography: Matrix3<f64>,
+    /// Its two motions, with the translation of either sign.
+    pub(super) motions: [Option<Motion>; 2],
+}
+
+/// The inverse depth of a match in view 1, its translation having length one, and the inverse of its variance at unit
+/// noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InverseDepth {
+    pub(super) x1: Vector3<f64>,
+    pub(super) value: f64,
+    pub(super) precision: f64,
+}
+
+/// The signed inverse depth `ρ = −(x2 × t) · (x2 × R x1) / |x2 × t|²` of a match in view 1.
+pub(super) fn inverse_depth(observations: &Observations, motion: &Motion, index: usize) -> InverseDepth {
+    let [x1, x2] = observations.vectors(index);
+    let across = x2.cross(&motion.direction);
+    let square = across.norm_squared().max(1e-18);
+    let value = -across.dot(&x2.cross(&(motion.q_21 * x1))) / square;
+    let precision = square / (x2.norm_squared() * observations.square_angle_of_pixel());
+    InverseDepth { x1, value, precision }
+}
+
+/// Fits a plane to the inliers of a motion, `sigma` their noise in pixels.
+pub(super) fn fit(
+    observations: &Observations,
+    motion: &Motion,
+    inliers: &[u32],
+    sigma: f64,
+    rng: &mut ChaCha8Rng,
+) -> Option<Plane> {
+    let judges = &inliers[..inliers.len().min(JUDGES)];
+    let depths: Vec<_> = judges.iter().map(|&i| inverse_depth(observations, motion, i as usize)).collect();
+    let g = most_common_plane(&depths, CAP * sigma * sigma, rng)?;
+    let mut homography = motion.q_21.to_rotation_matrix().into_inner() + motion.direction * g.transpose();
+    let loss = GemanMcClure::new(1.5 * SCALE * sigma);
+    refine_homography(&observations.framed(judges), &mut homography, &loss, STEPS);
+    Some(Plane { homography, motions: homography::motions(&homography) })
+}
+
+/// The `g` with `ρ = g · x1` for most of the points.
+fn most_common_plane(depths: &[InverseDepth], cap: f64, rng: &mut ChaCha8Rng) -> Option<Vector3<f64>> {
+    if depths.len() < 3 {
+        return None;
+    }
+    let (mut best, mut least) = (None, f64::INFINITY);
+    for _ in 0..SAMPLES {
+        let [a, b, c] = [0; 3].map(|_| &depths[rng.random_range(0..depths.len())]);
+        let columns = [b.x1.cross(&c.x1), c.x1.cross(&a.x1), a.x1.cross(&b.x1)];
+        let determinant = a.x1.dot(&columns[0]);
+        // The same point twice, or three in a line.
+        if determinant.abs() < 1e-9 {
+            continue;
+        }
+        let g = (columns[0] * a.value + columns[1] * b.value + columns[2] * c.value) / determinant;
+        let mut cost = 0.0;
+        for d in depths {
+            cost += ((d.value - g.dot(&d.x1)).powi(2) * d.precision).min(cap);
+            if cost > least {
+                break;
+            }
+        }
+        if cost < least {
+            (best, least) = (Some(g), cost);
+        }
+    }
+    best
+}

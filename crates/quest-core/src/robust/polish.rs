@@ -1,0 +1,65 @@
+//! The last refinement of a pose: over all of its inliers, with the noise that they show.
+
+use super::loss::{GemanMcClure, Truncated};
+use super::noise;
+use super::pose_score::{PoseScorer, Scored};
+use super::refine::{Subset, refine};
+use crate::solver::motion::Motion;
+
+/// Steps of each refinement.
+const STEPS: usize = 15;
+
+/// The scale of the last loss, in standard deviations of the noise.
+pub(super) const SCALE: f64 = 3.0;
+
+/// How far it looks, in standard deviations.
+const WIDE: f64 = 9.0;
+
+/// Fewer inliers than this do not determine a motion and its noise.
+pub(super) const FEWEST: usize = 6;
+
+/// A refined pose and its noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Polished {
+    pub(super) scored: Scored,
+    /// The standard deviation of the inliers' residuals, in pixels.
+    pub(super) sigma: f64,
+}
+
+/// Refines a pose by least squares over its inliers, measures the noise, and refines it with a loss of that scale. The
+/// inliers that [`PoseScorer`] holds afterwards are those of the result.
+pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
+    let threshold = poses.threshold;
+    let mut best = poses.score(start, threshold);
+    let mut motion = start;
+    if poses.inliers.len() >= FEWEST {
+        let subset = Subset::new(poses.observations, &poses.inliers);
+        refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
+        take_better(poses, &mut best, motion);
+    }
+    let sigma = sigma(poses, &best.motion);
+    poses.score(best.motion, WIDE * sigma);
+    if poses.inliers.len() >= FEWEST {
+        let mut motion = best.motion;
+        let subset = Subset::new(poses.observations, &poses.inliers);
+        refine(poses.observations, &subset, &mut motion, &GemanMcClure::new(SCALE * sigma), STEPS);
+        let scored = poses.best_pose(&motion.essential(), threshold);
+        best = scored.unwrap_or(best);
+    }
+    let sigma = self::sigma(poses, &best.motion);
+    Polished { scored: best, sigma }
+}
+
+fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
+    if let Some(scored) = poses.best_pose(&motion.essential(), poses.threshold)
+        && scored.cost < best.cost
+    {
+        *best = scored;
+    }
+}
+
+/// The noise of the inliers of a pose; leaves its inliers in `poses`.
+fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
+    poses.score(*motion, poses.threshold);
+    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals[i as usize]), poses.threshold)
+}

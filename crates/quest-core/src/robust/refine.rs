@@ -1,0 +1,228 @@
+//! Refinement of a motion on its manifold: Levenberg–Marquardt on the Sampson errors, with analytic derivatives.
+//!
+//! With `r = e / √g`, `e = x2ᵀ F x1` and `g` its squared gradient (see [`observations`](super::observations)), the derivative
+//! of `r` by the entries of `F` is one 3 × 3 matrix a match, and that of `F` by each of the five parameters of
+//! [`Motion`] one 3 × 3 matrix for all: a row of the Jacobian is five products of the two.
+
+use nalgebra::{Matrix3, Matrix5, Vector5};
+
+use super::loss::Loss;
+use super::observations::Observations;
+use crate::epipolar_frame::tangent_basis;
+use crate::solver::motion::{Motion, damped_step};
+
+/// Matches that are worked on at once.
+const WIDTH: usize = 4;
+
+/// A step shorter than this (radians) moves nothing that can be measured.
+const SHORT: f64 = 1e-8;
+
+/// A gain smaller than this share of the cost moves the motion by a small part of its deviation.
+const SMALL_GAIN: f64 = 1e-6;
+
+/// Some of the matches, in columns of their own.
+#[derive(Clone, Debug)]
+pub(super) struct Subset {
+    columns: [Vec<f64>; 6],
+    /// One for a match, zero for padding.
+    weights: Vec<f64>,
+    curvature: f64,
+    is_sphere: bool,
+}
+
+/// The normal equations of a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equations {
+    pub(super) cost: f64,
+    pub(super) hessian: Matrix5<f64>,
+    pub(super) gradient: Vector5<f64>,
+}
+
+impl Subset {
+    pub(super) fn new(observations: &Observations, indices: &[u32]) -> Self {
+        let padding = indices.len().next_multiple_of(WIDTH) - indices.len();
+        let columns = observations.columns().each_ref().map(|column| {
+            let last = indices.last().map(|&i| column[i as usize]);
+            let padding = std::iter::repeat_n(last.unwrap_or_default(), padding);
+            indices.iter().map(|&i| column[i as usize]).chain(padding).collect()
+        });
+        let mut weights = vec![1.0; indices.len()];
+        weights.resize(indices.len() + padding, 0.0);
+        let [k1, k2] = observations.curvature();
+        Self { columns, weights, curvature: k1 + k2, is_sphere: observations.is_sphere() }
+    }
+
+    /// The cost of a motion and the normal equations of a step from it.
+    pub(super) fn equations(
+        &self,
+        observations: &Observations,
+        motion: &Motion,
+        loss: &impl Loss,
+    ) -> Equations {
+        let f = observations.unscaled_fundamental(&motion.essential());
+        let derivatives = motion.essential_derivatives(&tangent_basis(&motion.direction));
+        let df = derivatives.map(|de| row_by_row(&observations.unscaled_fundamental(&de)));
+        let f = row_by_row(&f);
+        if self.is_sphere {
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || self.accumulate::<true>(&f, &df, loss),
+            )
+        } else {
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || self.accumulate::<false>(&f, &df, loss),
+            )
+        }
+    }
+
+    /// Compiled for the widest vectors of the processor; as no product is fused with a sum, the result is the same on all.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a call would leave the instructions it was dispatched to")]
+    fn accumulate<const SPHERE: bool>(
+        &self,
+        f: &[f64; 9],
+        df: &[[f64; 9]; 5],
+        loss: &impl Loss,
+    ) -> Equations {
+        let columns = self.columns.each_ref().map(|c| c.as_chunks::<WIDTH>().0);
+        let mut cost = [0.0; WIDTH];
+        let mut upper = [[0.0; WIDTH]; 15];
+        let mut gradient = [[0.0; WIDTH]; 5];
+        for (i, live) in self.weights.as_chunks::<WIDTH>().0.iter().enumerate() {
+            let points = columns.map(|c| &c[i]);
+            let (residual, slope) = linearised::<SPHERE>(f, points, self.curvature);
+            let mut weight = [0.0; WIDTH];
+            for j in 0..WIDTH {
+                let (c, w) = loss.cost_and_weight(residual[j] * residual[j]);
+                cost[j] += live[j] * c;
+                weight[j] = live[j] * w;
+            }
+            let mut jacobian = [[0.0; WIDTH]; 5];
+            for (row, df) in jacobian.iter_mut().zip(df) {
+                for k in 0..9 {
+                    for j in 0..WIDTH {
+                        row[j] += df[k] * slope[k][j];
+                    }
+                }
+            }
+            let mut entry = 0;
+            for a in 0..5 {
+                let mut weighted = [0.0; WIDTH];
+                for j in 0..WIDTH {
+                    weighted[j] = weight[j] * jacobian[a][j];
+                    gradient[a][j] += weighted[j] * residual[j];
+                }
+                for b in a..5 {
+                    for j in 0..WIDTH {
+                        upper[entry][j] += weighted[j] * jacobian[b][j];
+                    }
+                    entry += 1;
+                }
+            }
+        }
+        let mut hessian = Matrix5::zeros();
+        let mut entry = 0;
+        for a in 0..5 {
+            for b in a..5 {
+                let sum = upper[entry].iter().sum();
+                hessian[(a, b)] = sum;
+                hessian[(b, a)] = sum;
+                entry += 1;
+            }
+        }
+        Equations {
+            cost: cost.iter().sum(),
+            hessian,
+            gradient: Vector5::from_fn(|a, _| gradient[a].iter().sum()),
+        }
+    }
+}
+
+/// The residuals of a few matches, and their derivatives by the entries of `F`, row by row.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
+fn linearised<const SPHERE: bool>(
+    f: &[f64; 9],
+    [x1, y1, z1, x2, y2, z2]: [&[f64; WIDTH]; 6],
+    curvature: f64,
+) -> ([f64; WIDTH], [[f64; WIDTH]; 9]) {
+    let mut residual = [0.0; WIDTH];
+    let mut slope = [[0.0; WIDTH]; 9];
+    for j in 0..WIDTH {
+        let (z1, z2) = if SPHERE { (z1[j], z2[j]) } else { (1.0, 1.0) };
+        let (x1, y1, x2, y2) = (x1[j], y1[j], x2[j], y2[j]);
+        let l0 = f[0] * x1 + f[1] * y1 + f[2] * z1;
+        let l1 = f[3] * x1 + f[4] * y1 + f[5] * z1;
+        let l2 = f[6] * x1 + f[7] * y1 + f[8] * z1;
+        let m0 = f[0] * x2 + f[3] * y2 + f[6] * z2;
+        let m1 = f[1] * x2 + f[4] * y2 + f[7] * z2;
+        let m2 = if SPHERE { f[2] * x2 + f[5] * y2 + f[8] * z2 } else { 0.0 };
+        let e = x2 * l0 + y2 * l1 + z2 * l2;
+        let mut square = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1;
+        if SPHERE {
+            square += l2 * l2 + m2 * m2 - e * e * curvature;
+        }
+        let inverse = 1.0 / square.max(f64::MIN_POSITIVE).sqrt();
+        let r = e * inverse;
+        // dr = de/√g − r/(2g) dg, where dg = 2 (l · dl + m · dm − κ e de).
+        let q = r * inverse * inverse;
+        let along = if SPHERE { inverse + q * e * curvature } else { inverse };
+        let (p0, p1, p2) = (q * l0, q * l1, if SPHERE { q * l2 } else { 0.0 });
+        let (s0, s1, s2) = (q * m0, q * m1, if SPHERE { q * m2 } else { 0.0 });
+        residual[j] = r;
+        slope[0][j] = along * x2 * x1 - p0 * x1 - s0 * x2;
+        slope[1][j] = along * x2 * y1 - p0 * y1 - s1 * x2;
+        slope[2][j] = along * x2 * z1 - p0 * z1 - s2 * x2;
+        slope[3][j] = along * y2 * x1 - p1 * x1 - s0 * y2;
+        slope[4][j] = along * y2 * y1 - p1 * y1 - s1 * y2;
+        slope[5][j] = along * y2 * z1 - p1 * z1 - s2 * y2;
+        slope[6][j] = along * z2 * x1 - p2 * x1 - s0 * z2;
+        slope[7][j] = along * z2 * y1 - p2 * y1 - s1 * z2;
+        slope[8][j] = along * z2 * z1 - p2 * z1 - s2 * z2;
+    }
+    (residual, slope)
+}
+
+#[inline]
+fn row_by_row(m: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|k| m[(k / 3, k % 3)])
+}
+
+/// Brings a motion to a local minimum of the summed loss over the subset; the cost there.
+pub(super) fn refine(
+    observations: &Observations,
+    subset: &Subset,
+    motion: &mut Motion,
+    loss: &impl Loss,
+    max_steps: usize,
+) -> f64 {
+    let mut damping = 1e-4;
+    let mut current = subset.equations(observations, motion, loss);
+    for _ in 0..max_steps {
+        let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else {
+            damping = 10.0 * damping;
+            if damping > 1e4 {
+                break;
+            }
+            continue;
+        };
+        let trial = motion.stepped(&tangent_basis(&motion.direction), &step.into());
+        let next = subset.equations(observations, &trial, loss);
+        let gain = current.cost - next.cost;
+        let is_short = step.norm_squared() < SHORT * SHORT;
+        if gain > 0.0 {
+            (*motion, current) = (trial, next);
+            damping = (0.1 * damping).max(1e-10);
+            if is_short || gain < SMALL_GAIN * current.cost {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+            if is_short || damping > 1e4 {
+                break;
+            }
+        }
+    }
+    current.cost
+}

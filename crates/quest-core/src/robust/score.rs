@@ -1,0 +1,92 @@
+//! How well a motion explains all matches: one number, zero for perfect and one a match at worst.
+//!
+//! The loss of a residual `r` is the truncated square averaged over all thresholds up to `T`,
+//!
+//! ```text
+//! ρ(u) = 2u − u²,   u = min(|r| / T, 1)
+//! ```
+//!
+//! which does not hang on one threshold (the idea of MAGSAC: D. Barath, J. Matas, J. Noskova, CVPR 2019, in one dimension).
+
+use nalgebra::Matrix3;
+
+use super::observations::Observations;
+use crate::lanes::{self, BearingMatches, ImageMatches, Loss, Stop};
+
+/// The loss reaches one at this multiple of the inlier threshold.
+pub(super) const REACH: f64 = 2.5;
+
+/// The mean score of a match that a hypothesis has to be likely to reach, where none is known yet.
+const LEAST_MEAN: f64 = 0.03;
+
+/// With fewer matches the loss is the truncated square: of eight matches five are fitted by any motion, and what is left must
+/// not be rewarded for being small.
+pub(super) const MANY: usize = 10;
+
+/// The loss of a residual in units of the reach, for one of `count` matches.
+pub(super) fn loss(u: f64, count: usize) -> f64 {
+    let u = u.abs().min(1.0);
+    if count < MANY { u * u } else { u * (2.0 - u) }
+}
+
+/// The matches as the kernels take them.
+#[derive(Debug)]
+enum Columns {
+    Plane(ImageMatches<f32>),
+    Sphere(BearingMatches<f32>),
+}
+
+/// The search's score of essential matrices.
+#[derive(Debug)]
+pub(super) struct Scorer<'a> {
+    observations: &'a Observations,
+    kernel: lanes::Scorer,
+    columns: Columns,
+    /// `T` in the unit of the columns.
+    reach: f64,
+}
+
+impl<'a> Scorer<'a> {
+    /// `threshold` in pixels.
+    pub(super) fn new(observations: &'a Observations, threshold: f64) -> Self {
+        let reach = REACH * threshold;
+        let matches = &observations.matches;
+        let kernel = lanes::Scorer::new();
+        if observations.is_sphere() {
+            let mut columns = BearingMatches::new();
+            for m in matches {
+                columns.push((*m.bearing1()).into(), (*m.bearing2()).into());
+            }
+            // One angle for both views: an exact weight would have to know which view a residual comes from.
+            let angle = (0.5 * observations.square_angle_of_pixel()).sqrt();
+            return Self { observations, kernel, columns: Columns::Sphere(columns), reach: reach * angle };
+        }
+        let mut columns = ImageMatches::new();
+        let [x1, y1, _, x2, y2, _] = observations.columns();
+        for i in 0..matches.len() {
+            columns.push([x1[i], y1[i]], [x2[i], y2[i]]);
+        }
+        Self { observations, kernel, columns: Columns::Plane(columns), reach }
+    }
+
+    /// The summed loss of an essential matrix, `None` where it is not below `best`, or most likely is not.
+    pub(super) fn score(&self, e: &Matrix3<f64>, best: f64) -> Option<f64> {
+        let count = self.observations.len() as f64;
+        let stop = Stop::Unlikely((1.0 - best / count).max(LEAST_MEAN));
+        let score = match &self.columns {
+            Columns::Plane(columns) => {
+                let f = rows(&self.observations.fundamental(e));
+                self.kernel.score(columns, &f, self.reach, Loss::Marginalised, stop)
+            }
+            Columns::Sphere(columns) => {
+                self.kernel.score(columns, &rows(e), self.reach, Loss::Marginalised, stop)
+            }
+        };
+        let loss = count - score.sum;
+        (score.visited == self.observations.len() && loss < best).then_some(loss)
+    }
+}
+
+fn rows(m: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|k| m[(k / 3, k % 3)])
+}

@@ -1,0 +1,89 @@
+//! Whether a pose agrees with more matches, or more closely, than chance would let it.
+//!
+//! How often a false match comes within a distance `r` of agreeing with a pose is measured on false matches: the points of view 1
+//! with those of view 2 shifted against them. That probability is `α(r) = r α(1)`, a band along a line. Of `n` matches the `k`
+//! nearest are within `r_k`; five of them any sample fits. So among `m` motions that were tried, the number of those that do as
+//! well by chance is at most
+//!
+//! ```text
+//! NFA = min over k of (n − 5) m C(n − 5, k − 5) α(r_k)^(k − 5)
+//! ```
+//!
+//! (after L. Moisan, B. Stival, *A probabilistic criterion to detect rigid point matches between two images*, IJCV 2004, who take
+//! all `C(n, 5)` samples for `m`).
+
+use super::observations::Observations;
+use super::pose_score::PoseScorer;
+use crate::Correspondence;
+use crate::solver::motion::Motion;
+
+/// False matches that are looked at.
+const FALSE_MATCHES: usize = 300;
+
+/// False matches are counted up to this multiple of the threshold: there are more of them.
+const WIDE: f64 = 3.0;
+
+/// Real solutions of a sample, on average.
+const SOLUTIONS: f64 = 4.0;
+
+/// The logarithm (base ten) of the number of false alarms that is accepted.
+const ACCEPTED: f64 = -0.5;
+
+/// Whether chance does not explain the inliers that `poses` holds, those of `motion`, found among so many samples.
+pub(super) fn is_significant(poses: &PoseScorer, motion: &Motion, iterations: usize) -> bool {
+    let observations = poses.observations;
+    let chance = chance_of_a_pixel(observations, motion, poses.threshold);
+    let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals[i as usize].abs()).collect();
+    errors.sort_unstable_by(f64::total_cmp);
+    log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64) < ACCEPTED
+}
+
+/// The base ten logarithm of the number of false alarms, for the inliers' errors in ascending order.
+fn log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, tried: f64) -> f64 {
+    let free = matches - 5;
+    let all_samples: f64 = (0..5).map(|i| ((matches - i) as f64 / (5 - i) as f64).log10()).sum();
+    let fixed = (free as f64).log10() + tried.log10().min(all_samples + SOLUTIONS.log10());
+    let (mut choose, mut least) = (0.0, f64::INFINITY);
+    for (k, error) in (1..).zip(errors.iter().skip(5)) {
+        choose += ((free + 1 - k) as f64 / k as f64).log10();
+        let alarms = fixed + choose + k as f64 * (error * chance_of_a_pixel).min(1.0).log10();
+        least = alarms.min(least);
+    }
+    least
+}
+
+/// The share of false matches that agree with a motion to one pixel.
+fn chance_of_a_pixel(observations: &Observations, motion: &Motion, threshold: f64) -> f64 {
+    let n = observations.len();
+    let shifts = FALSE_MATCHES.div_ceil(n).min(n - 1);
+    let (mut agreeing, mut all) = (1.0, 1.0);
+    for k in 1..=shifts {
+        let shift = k * (n - 1) / shifts;
+        let shifted: Vec<Correspondence> = (0..n.min(FALSE_MATCHES))
+            .map(|i| observations.matches[i].with_view2_of(&observations.matches[(i + shift) % n]))
+            .collect();
+        let false_matches = observations.with_matches(shifted);
+        let mut poses = PoseScorer::new(&false_matches, WIDE * threshold);
+        poses.score(*motion, WIDE * threshold);
+        agreeing += poses.inliers.len() as f64;
+        all += false_matches.len() as f64;
+    }
+    agreeing / all / (WIDE * threshold)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn false_alarms_are_counted() {
+        // 5 · 252 · 4 · C(5, 5) · 0.01^5 = 5.04e-7.
+        let all = log_false_alarms(10, &[1.0; 10], 0.01, 1e9);
+        assert!((10_f64.powf(all) / 5.04e-7 - 1.0).abs() < 1e-9, "{all}");
+        // Ten of a hundred are no sign of anything, thirty are, and ten that agree closely.
+        assert!(log_false_alarms(100, &[1.0; 10], 0.01, 1e5) > 0.0);
+        assert!(log_false_alarms(100, &[1.0; 30], 0.01, 1e5) < -10.0);
+        assert!(log_false_alarms(100, &[1e-4; 10], 0.01, 1e5) < -10.0);
+        assert!(log_false_alarms(100, &[1.0; 5], 0.01, 1e5).is_infinite());
+    }
+}

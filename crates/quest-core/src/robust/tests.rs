@@ -1,0 +1,257 @@
+//! Planted poses among outliers.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::*;
+use crate::simulate::{FOCAL_LENGTH, Layout, Motion as SceneMotion, Scene, SceneOptions};
+use crate::solver::SolverName;
+use crate::{Camera, CameraModel, RelativePose, correspondence};
+
+/// One seed for this file; every test takes its own indices.
+const SEED: u64 = 0x0b57;
+
+fn options() -> Options {
+    Options { threshold: 1.5, focal_lengths: [[FOCAL_LENGTH; 2]; 2], ..Options::default() }
+}
+
+fn noisy(points: usize) -> SceneOptions {
+    SceneOptions { points, noise_px: 0.5, ..SceneOptions::realistic() }
+}
+
+fn scene(options: &SceneOptions, outliers: f64, index: u64) -> (Scene, Vec<bool>) {
+    let mut scene = Scene::generate(options, SEED, index).unwrap();
+    let is_true = scene.add_outliers(outliers, SEED, index).unwrap();
+    (scene, is_true)
+}
+
+/// Rotation and direction of translation, in degrees.
+fn errors(pose: &RelativePose, truth: &RelativePose) -> [f64; 2] {
+    [pose.rotation_error(truth).to_degrees(), pose.translation_error(truth).unwrap_or(0.0).to_degrees()]
+}
+
+#[test]
+fn planted_poses_are_found_among_outliers() {
+    for (outliers, index) in [(0.0, 0), (0.3, 1), (0.5, 2), (0.7, 3)] {
+        let (scene, is_true) = scene(&noisy(200), outliers, index);
+        let found = estimate(&scene.matches, &options()).unwrap();
+        assert_eq!(found.model, Model::General, "{outliers}");
+        let [r, t] = errors(&found.pose, &scene.truth);
+        // Half a pixel is 0.03° and averages out over dozens of points.
+        assert!(r < 0.5 && t < 3.0, "{outliers}: {r} {t}");
+        // The length is that of the truth, which has the same scale.
+        let ratio = found.pose.t_21.norm() / scene.truth.t_21.norm();
+        assert!((ratio - 1.0).abs() < 0.1, "{outliers}: {ratio}");
+        // A false match in 50 or so lies on its epipolar line; a true one in 100 lies off by three deviations.
+        let wrong = found.inliers.iter().zip(&is_true).filter(|(a, b)| a != b).count();
+        assert!(wrong < 20, "{outliers}: {wrong}");
+        assert_eq!(found.inlier_count, found.inliers.iter().filter(|i| **i).count());
+        assert!((found.noise_px - 0.5).abs() < 0.15, "{}", found.noise_px);
+    }
+}
+
+#[test]
+fn exact_matches_give_the_exact_pose() {
+    for index in 10..15 {
+        let scene = Scene::generate(&SceneOptions { points: 50, ..SceneOptions::realistic() }, SEED, index);
+        let scene = scene.unwrap();
+        let found = estimate(&scene.matches, &options()).unwrap();
+        assert!(found.pose.rotation_error(&scene.truth) < 1e-6);
+        assert!((found.pose.t_21 - scene.truth.t_21).norm() < 1e-5);
+        assert_eq!(found.inlier_count, 50);
+    }
+}
+
+#[test]
+fn planes_are_recognised_and_have_two_poses() {
+    let planar = SceneOptions { layout: Layout::Coplanar, ..noisy(100) };
+    let (mut two, mut near) = (0, 0);
+    for index in 20..30 {
+        let (scene, _) = scene(&planar, 0.3, index);
+        let found = estimate(&scene.matches, &options()).unwrap();
+        assert_eq!(found.model, Model::Planar, "scene {index}: {:?}", found.evidence);
+        two += usize::from(found.runner_up.is_some());
+        let poses = [Some(found.pose), found.runner_up.map(|r| r.pose)];
+        let error = |p: &RelativePose| errors(p, &scene.truth).into_iter().fold(0.0, f64::max);
+        near += usize::from(poses.iter().flatten().map(error).fold(180.0, f64::min) < 10.0);
+    }
+    assert!(two >= 5, "{two}");
+    assert!(near >= 9, "{near}");
+}
+
+#[test]
+fn a_camera_that_turns_in_place_has_a_rotation_and_no_translation() {
+    let turning = SceneOptions { motion: SceneMotion::PureRotation, ..noisy(100) };
+    for index in 40..50 {
+        let (scene, _) = scene(&turning, 0.3, index);
+        let found = estimate(&scene.matches, &options()).unwrap();
+        assert_eq!(found.model, Model::PureRotation, "scene {index}: {:?}", found.evidence);
+        assert!(found.pose.rotation_error(&scene.truth).to_degrees() < 0.2);
+        assert!(found.pose.t_21.norm() < 0.02, "{}", found.pose.t_21.norm());
+        assert!(found.runner_up.is_none());
+        // The translation is within its deviation of nothing.
+        assert!(found.covariance[(3, 3)].sqrt() > 0.5 * found.pose.t_21.norm());
+    }
+}
+
+#[test]
+fn an_exact_rotation_needs_no_translation() {
+    let turning = SceneOptions { motion: SceneMotion::PureRotation, points: 60, ..SceneOptions::realistic() };
+    let (scene, _) = scene(&turning, 0.3, 55);
+    let found = estimate(&scene.matches, &options()).unwrap();
+    assert_eq!(found.model, Model::PureRotation);
+    assert!(found.pose.rotation_error(&scene.truth) < 1e-7);
+    assert!(found.pose.t_21.norm() < 1e-6);
+}
+
+#[test]
+fn the_seed_decides_and_nothing_else() {
+    let (scene, _) = scene(&noisy(100), 0.5, 60);
+    let with = |seed| estimate(&scene.matches, &Options { seed, ..options() }).unwrap();
+    assert_eq!(with(1), with(1));
+    assert_ne!(with(1).iterations + with(2).iterations, 0);
+    let problem = Problem { matches: &scene.matches, focal_lengths: [[FOCAL_LENGTH; 2]; 2] };
+    for threads in [0, 1, 2, 3] {
+        let all = estimate_batch(&[problem; 5], &Options { seed: 1, ..options() }, threads);
+        assert!(all.iter().all(|e| e.as_ref().unwrap() == &with(1)));
+    }
+}
+
+#[test]
+fn false_matches_have_no_pose() {
+    let limits = Options { max_iterations: 5_000, ..options() };
+    for (points, index) in [(20, 70), (50, 71), (100, 72), (300, 73)] {
+        let (scene, _) = scene(&noisy(points), 1.0, index);
+        let refused = estimate(&scene.matches, &limits).unwrap_err();
+        let EstimateError::NoPose { inliers, matches } = refused else { panic!("{refused}") };
+        assert!(matches == points && inliers < points, "{refused}");
+    }
+}
+
+#[test]
+fn few_matches_give_their_best_pose() {
+    for points in 5..12 {
+        let exact = SceneOptions { points, ..SceneOptions::realistic() };
+        let mut found_truth = 0;
+        for index in 80..90 {
+            let scene = Scene::generate(&exact, SEED, index).unwrap();
+            let found = estimate(&scene.matches, &options()).unwrap();
+            assert_eq!(found.inlier_count, points);
+            let poses = [Some(found.pose), found.runner_up.map(|r| r.pose)];
+            let near = |p: &RelativePose| p.rotation_error(&scene.truth) < 1e-3;
+            found_truth += usize::from(poses.iter().flatten().any(near));
+        }
+        // Five points in front of both cameras have two or three poses, six mostly one.
+        assert!(found_truth >= if points == 5 { 5 } else { 8 }, "{points}: {found_truth}");
+    }
+}
+
+#[test]
+fn every_solver_finds_it() {
+    let (general, _) = scene(&noisy(100), 0.2, 100);
+    let (plane, _) = scene(&SceneOptions { layout: Layout::Coplanar, ..noisy(100) }, 0.2, 101);
+    for solver in SolverName::ALL {
+        let scene = if solver == SolverName::Homography { &plane } else { &general };
+        let found = estimate(&scene.matches, &Options { solver, ..options() }).unwrap();
+        let r = found.pose.rotation_error(&scene.truth).to_degrees();
+        let other = found.runner_up.map_or(180.0, |o| o.pose.rotation_error(&scene.truth).to_degrees());
+        assert!(r.min(other) < 1.0, "{}: {r} {other}", solver.info().name);
+    }
+}
+
+#[test]
+fn bearings_of_any_length_are_taken_on_the_sphere() {
+    let (scene, _) = scene(&noisy(100), 0.3, 110);
+    let x1: Vec<[f64; 3]> = scene.matches.iter().map(|m| (*m.bearing1()).into()).collect();
+    let x2: Vec<[f64; 3]> = scene.matches.iter().map(|m| (*m.bearing2()).into()).collect();
+    let matches = correspondence::from_bearings(&x1, &x2).unwrap();
+    let found = estimate(&matches, &options()).unwrap();
+    let [r, t] = errors(&found.pose, &scene.truth);
+    assert!(r < 0.5 && t < 3.0, "{r} {t}");
+}
+
+#[test]
+fn priors_help() {
+    let (scene, is_true) = scene(&noisy(200), 0.8, 120);
+    // Scores that know the truth: a handful of samples is enough.
+    let scores: Vec<f64> = is_true.iter().map(|t| f64::from(u8::from(*t))).collect();
+    let few = Options { min_iterations: 0, max_iterations: 20, ..options() };
+    let priors = Priors { scores: Some(&scores), ..Priors::default() };
+    let found = estimate_with(&scene.matches, &few, &priors).unwrap();
+    assert!(found.pose.rotation_error(&scene.truth).to_degrees() < 1.0);
+    // So is a pose that is nearly right.
+    let near = RelativePose::new(
+        UnitQuaternion::new(Vector3::new(0.002, 0.0, 0.0)) * scene.truth.q_21,
+        scene.truth.t_21,
+    );
+    let priors = Priors { pose: Some(near), ..Priors::default() };
+    let found = estimate_with(&scene.matches, &Options { max_iterations: 1, ..few }, &priors).unwrap();
+    assert!(found.pose.rotation_error(&scene.truth).to_degrees() < 1.0);
+}
+
+#[test]
+fn a_known_direction_excludes_poses() {
+    let (scene, _) = scene(&noisy(100), 0.3, 121);
+    let axis = Vector3::new(0.0, 1.0, 0.0);
+    let right = KnownDirection { in_view1: axis, in_view2: scene.truth.q_21 * axis, tolerance: 0.02 };
+    let with = |direction| {
+        let priors = Priors { direction: Some(direction), ..Priors::default() };
+        estimate_with(&scene.matches, &Options { max_iterations: 1000, ..options() }, &priors)
+    };
+    assert!(with(right).unwrap().pose.rotation_error(&scene.truth).to_degrees() < 0.5);
+    let wrong = KnownDirection { in_view2: -right.in_view2, ..right };
+    assert!(with(wrong).is_err());
+}
+
+#[test]
+fn bad_input_is_refused_at_the_door() {
+    let (scene, _) = scene(&noisy(20), 0.0, 130);
+    let error = |options: Options| estimate(&scene.matches, &options).unwrap_err().to_string();
+    for threshold in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(error(Options { threshold, ..options() }).contains("threshold"));
+    }
+    for confidence in [0.0, 1.0, f64::NAN] {
+        assert!(error(Options { confidence, ..options() }).contains("confidence"));
+    }
+    assert!(error(Options { max_iterations: 0, ..options() }).contains("iterations"));
+    assert!(error(Options { focal_lengths: [[0.0; 2]; 2], ..options() }).contains("focal length"));
+    let few = estimate(&scene.matches[..4], &options()).unwrap_err();
+    assert_eq!(few, InputError::TooFewMatches { found: 4, needed: 5 }.into());
+    let scores = Priors { scores: Some(&[1.0]), ..Priors::default() };
+    assert!(estimate_with(&scene.matches, &options(), &scores).unwrap_err().to_string().contains("scores"));
+    let line: Vec<_> = (0..20).map(|i| [0.01 * f64::from(i), 0.0]).collect();
+    let collinear =
+        correspondence::from_image_points(&line, &line.iter().map(|x| [x[0] * 1.1, 0.1]).collect::<Vec<_>>())
+            .unwrap();
+    let refused = estimate(&collinear, &options()).unwrap_err();
+    assert!(matches!(refused, EstimateError::Input(InputError::Degenerate(_))), "{refused}");
+}
+
+#[test]
+fn a_fisheye_camera_sees_behind_itself() {
+    let camera =
+        Camera::new(CameraModel::OpenCvFisheye, &[300.0, 300.0, 480.0, 480.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    let truth =
+        RelativePose::new(UnitQuaternion::new(Vector3::new(0.1, -0.2, 0.15)), Vector3::new(0.3, 0.1, -0.2));
+    let mut rng = sampling::generator(SEED);
+    let mut matches = Vec::new();
+    while matches.len() < 80 {
+        use rand::RngExt;
+        let x1 = Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0));
+        if x1.norm() < 0.5 {
+            continue;
+        }
+        let pixel =
+            |x: &Vector3<f64>, noise: [f64; 2]| camera.project(x).map(|u| [u[0] + noise[0], u[1] + noise[1]]);
+        let noise = [rng.random_range(-0.5..0.5), rng.random_range(-0.5..0.5)];
+        let x2 = truth.q_21 * x1 + truth.t_21;
+        if let (Ok(u1), Ok(u2)) = (pixel(&x1, noise), pixel(&x2, [noise[1], -noise[0]]))
+            && let Ok(m) = Correspondence::from_pixels(&camera, u1, &camera, u2)
+        {
+            matches.push(m);
+        }
+    }
+    let found = estimate(&matches, &Options::in_pixels(1.5, &camera, &camera)).unwrap();
+    let [r, t] = errors(&found.pose, &truth);
+    assert!(r < 0.3 && t < 2.0, "{r} {t}");
+    assert!(found.inlier_count > 75);
+}

@@ -1,0 +1,215 @@
+//! From the best pose of the search to the estimate: the last refinement, the other pose of a plane, the model, the length of
+//! the translation, the covariance.
+
+use nalgebra::UnitQuaternion;
+use rand_chacha::ChaCha8Rng;
+
+use super::covariance;
+use super::estimate::{Estimate, Model, RunnerUp};
+use super::length::{Length, length};
+use super::loss::GemanMcClure;
+use super::model::{Verdict, choose};
+use super::observations::Observations;
+use super::options::EstimateError;
+use super::plane::{self, Plane};
+use super::polish::{FEWEST, Polished, SCALE, polish};
+use super::pose_score::{PoseScorer, Scored};
+use super::refine::{Subset, refine};
+use super::score::MANY;
+use super::search::Search;
+use super::significance::is_significant;
+use super::transfer::square_error;
+use crate::RelativePose;
+use crate::solver::motion::Motion;
+use crate::structure::translation_direction;
+
+/// Poses closer than this in rotation and in the direction of translation (radians) are the same answer.
+const SAME: f64 = 0.02;
+const SAME_DIRECTION: f64 = 0.1;
+
+/// The runner-up has at least this share of the inliers of the best.
+const NEARLY_AS_WELL: f64 = 0.8;
+
+/// A pose replaces another of which it is not a refinement only if its cost is lower by this.
+const CLEARLY: f64 = 1e-4;
+
+/// Inliers that an alternative is first refined over, steps, and how far it looks in units of the threshold.
+const MATCHES: usize = 200;
+const STEPS: usize = 8;
+const WIDE: f64 = 2.0;
+
+/// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
+const NEAR_POINT: f64 = 3.0;
+
+/// Steps 3 to 6.
+pub(super) fn conclude(
+    search: &mut Search,
+    best: Scored,
+    rng: &mut ChaCha8Rng,
+) -> Result<Estimate, EstimateError> {
+    let iterations = search.iterations;
+    let of_few = std::mem::take(&mut search.all);
+    let poses = &mut search.poses;
+    let mut polished = polish(poses, best.motion);
+    let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
+    let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, polished.sigma));
+    replace(poses, &mut polished, &mut others);
+    poses.score(polished.scored.motion, poses.threshold);
+    let (observations, inliers) = (poses.observations, poses.inliers.len());
+    // Of fewer matches chance cannot be told from truth, and the best pose is returned as it is.
+    if observations.len() >= MANY && !is_significant(poses, &polished.scored.motion, iterations) {
+        return Err(EstimateError::NoPose { inliers, matches: observations.len() });
+    }
+    let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
+    Ok(assemble(poses, &polished, &others, &of_few, &verdict, iterations))
+}
+
+/// One of the motions of a plane: as its homography has it, and refined as any other motion.
+#[derive(Clone, Copy, Debug)]
+struct Alternative {
+    of_plane: Scored,
+    refined: Scored,
+}
+
+fn alternatives(poses: &mut PoseScorer, plane: &Plane, sigma: f64) -> Vec<Alternative> {
+    let wide = WIDE * poses.threshold;
+    let loss = GemanMcClure::new(SCALE * sigma);
+    let mut all = Vec::new();
+    for motion in plane.motions.iter().flatten() {
+        let Some(of_plane) = poses.best_pose(&motion.essential(), wide) else { continue };
+        let mut refined = of_plane;
+        let count = poses.inliers.len().min(MATCHES);
+        if count >= FEWEST {
+            let subset = Subset::new(poses.observations, &poses.inliers[..count]);
+            let mut motion = of_plane.motion;
+            refine(poses.observations, &subset, &mut motion, &loss, STEPS);
+            refined = poses.best_pose(&motion.essential(), wide).unwrap_or(refined);
+        }
+        all.push(Alternative { of_plane, refined });
+    }
+    all
+}
+
+fn is_same(a: &Motion, b: &Motion) -> bool {
+    a.q_21.angle_to(&b.q_21) < SAME && a.direction.dot(&b.direction) > SAME_DIRECTION.cos()
+}
+
+/// Puts an alternative that explains the matches better in the place of the pose, which becomes an alternative itself.
+fn replace(poses: &mut PoseScorer, polished: &mut Polished, others: &mut [Alternative]) {
+    let better = |a: &&mut Alternative| {
+        a.refined.cost < polished.scored.cost - CLEARLY
+            && !is_same(&a.refined.motion, &polished.scored.motion)
+    };
+    let best = others.iter_mut().filter(better).min_by(|a, b| a.refined.cost.total_cmp(&b.refined.cost));
+    if let Some(best) = best {
+        *polished = polish(poses, best.refined.motion);
+    }
+}
+
+fn assemble(
+    poses: &mut PoseScorer,
+    polished: &Polished,
+    others: &[Alternative],
+    of_few: &[Scored],
+    verdict: &Verdict,
+    iterations: usize,
+) -> Estimate {
+    let observations = poses.observations;
+    let sigma = polished.sigma;
+    let mut model = verdict.model;
+    let mut motion = polished.scored.motion;
+    match model {
+        // The homography has the motion of a plane better than the essential matrix.
+        Model::Planar if verdict.is_exact_plane => motion = of_plane(others, &motion).unwrap_or(motion),
+        Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
+        _ => {}
+    }
+    let scored = poses.score(motion, poses.threshold);
+    if model == Model::PureRotation {
+        let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
+        let limit = (NEAR_POINT * poses.threshold).powi(2);
+        poses.inliers.retain(|&i| square_error(&r_21, &observations.framed(&[i])[0]) < limit);
+    }
+    let inliers = poses.inliers.clone();
+    let size = length(observations, &motion, &inliers, sigma);
+    let covariance = match model {
+        Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
+        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size),
+    };
+    if covariance.is_none() {
+        model = Model::Degenerate;
+    }
+    let mut mask = vec![false; observations.len()];
+    for &i in &inliers {
+        mask[observations.order[i as usize]] = true;
+    }
+    Estimate {
+        model,
+        pose: with_length(&motion, size),
+        covariance: covariance.unwrap_or_else(covariance::unknown),
+        inlier_count: inliers.len(),
+        inliers: mask,
+        score: share(&scored, observations),
+        iterations,
+        runner_up: match model {
+            Model::PureRotation => None,
+            _ if observations.len() < MANY => second_of_few(poses, of_few, &motion, sigma),
+            Model::Planar => other_of_plane(poses, others, &motion, sigma),
+            _ => None,
+        },
+        evidence: verdict.evidence,
+        noise_px: sigma,
+    }
+}
+
+/// The motion of the plane that is nearest to a refined motion.
+fn of_plane(others: &[Alternative], motion: &Motion) -> Option<Motion> {
+    let near = others.iter().filter(|a| is_same(&a.refined.motion, motion));
+    near.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost)).map(|a| a.of_plane.motion)
+}
+
+/// The motion of a camera that only turns: the direction of what translation is left.
+fn still(observations: &Observations, inliers: &[u32], q_21: UnitQuaternion<f64>) -> Motion {
+    let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
+    Motion { q_21, direction: translation_direction(&q_21, &matches) }
+}
+
+fn with_length(motion: &Motion, size: Length) -> RelativePose {
+    RelativePose::new(motion.q_21, motion.direction * size.value)
+}
+
+fn share(scored: &Scored, observations: &Observations) -> f64 {
+    (1.0 - scored.cost / observations.len() as f64).clamp(0.0, 1.0)
+}
+
+/// The other motion of the plane, where it is feasible.
+fn other_of_plane(
+    poses: &mut PoseScorer,
+    others: &[Alternative],
+    best: &Motion,
+    sigma: f64,
+) -> Option<RunnerUp> {
+    poses.score(*best, poses.threshold);
+    let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
+    let different = others.iter().filter(|a| !is_same(&a.of_plane.motion, best));
+    let other = different.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost))?;
+    let other = runner_up(poses, other.of_plane.motion, sigma);
+    (other.inlier_count as f64 >= fewest).then_some(other)
+}
+
+/// The next best of the poses that few matches have.
+fn second_of_few(poses: &mut PoseScorer, all: &[Scored], best: &Motion, sigma: f64) -> Option<RunnerUp> {
+    let different = all.iter().filter(|s| !is_same(&s.motion, best));
+    let other = different.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    Some(runner_up(poses, other.motion, sigma))
+}
+
+fn runner_up(poses: &mut PoseScorer, motion: Motion, sigma: f64) -> RunnerUp {
+    let scored = poses.score(motion, poses.threshold);
+    let size = length(poses.observations, &scored.motion, &poses.inliers, sigma);
+    RunnerUp {
+        pose: with_length(&scored.motion, size),
+        score: share(&scored, poses.observations),
+        inlier_count: poses.inliers.len(),
+    }
+}

@@ -1,0 +1,312 @@
+//! Appendix C: a robot with two driven wheels.
+//!
+//! The goal's origin has the coordinates `t` in the robot's frame: `r = hypot(tx, tz)` away, at the bearing
+//! `φ = atan2(tx, tz)`, positive to the right. The paper's (C.1) has the two arguments swapped; with it the law fails.
+//! The heading `θ`, positive to the right, is that of `R_21 = R_y(−θ)`:
+//!
+//! ```text
+//! tx = r sin φ,  tz = r cos φ        θ = atan2(R20 − R02, R00 + R22)
+//! ```
+//!
+//! The kinematics (C.3) in these coordinates, with `c` the unit of t in metres, are
+//!
+//! ```text
+//! ṙ = −(ν/c) cos φ        φ̇ = −ω + (ν/c) sin φ / r
+//! ```
+//!
+//! With `s = sign(cos φ)` and `ψ = φ` where the goal is ahead (`s = 1`), `ψ = φ − π` where it is behind, the law
+//!
+//! ```text
+//! ν = k1 tanh(r) cos φ        ω = k2 s sin φ = k2 sin ψ
+//! ```
+//!
+//! gives
+//!
+//! ```text
+//! ṙ = −(k1/c) tanh(r) cos²ψ        ψ̇ = −sin ψ (k2 − (k1/c) (tanh(r)/r) cos ψ)
+//! ```
+//!
+//! For `k2 > k1/c` the bracket is positive, because `tanh(r)/r < 1`: `V = r²/2 + 1 − cos ψ` decreases wherever `r > 0` and
+//! `ψ ≠ 0`, and `|ψ| → 0` without ever crossing 90° again. The robot drives to the goal, backwards where the goal is behind
+//! it. Always turning towards the goal (`s = 1`) would converge too, by turning its back on the features. With the printed
+//! sign `ω = −k2 sin φ` the robot turns away from a goal ahead until it has its back to it.
+//!
+//! Near the goal (`r` below a limit) it stops and turns: `ν = 0`, `ω = −k2 sin θ`, (C.6), (C.7); `1 − cos θ` decreases.
+//!
+//! # Beside the paper
+//! - **Stopping.** Near the goal `φ` is made of noise. The robot stops where `r` is small, also where what is left lies
+//!   sideways (`r |cos φ|` small), which driving cannot mend, and stays stopped until `r` is clearly larger.
+//! - **Turning fades** with `r² / (r² + f²)` for the same reason.
+//! - **Hysteresis.** `s` changes only beyond `|cos φ| > 0.1`.
+
+use super::{ControlLaw, Twist};
+use crate::RelativePose;
+
+/// `s` changes where the cosine of the bearing exceeds this: six degrees past sideways.
+const SIDEWAYS: f64 = 0.1;
+
+/// The distance, bearing and heading of a robot that moves on a plane, from its pose relative to the goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarPose {
+    /// The distance of the goal, (C.2), in the unit of t.
+    pub distance: f64,
+    /// The bearing of the goal `φ` in radians, zero ahead, positive to the right.
+    pub bearing: f64,
+    /// The robot's heading `θ` in radians, zero as the goal's, positive to the right.
+    pub heading: f64,
+}
+
+impl PlanarPose {
+    /// The part of a pose on the plane x–z; what is not on it is left out.
+    #[must_use]
+    pub fn new(pose: &RelativePose) -> Self {
+        let (r, t) = (pose.r_21(), &pose.t_21);
+        Self {
+            distance: t.x.hypot(t.z),
+            bearing: t.x.atan2(t.z),
+            heading: (r[(2, 0)] - r[(0, 2)]).atan2(r[(0, 0)] + r[(2, 2)]),
+        }
+    }
+}
+
+/// The switching law (C.4) to (C.7), its signs derived at the head of the module.
+///
+/// Distances are in the unit of `t`: the mean depth of the features at the goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DifferentialDriveLaw {
+    /// The gain of the speed, `k1`, in m/s.
+    pub speed_gain: f64,
+    /// The gain of the turn rate, `k2`, in rad/s. Has to exceed `k1 / c`, `c` the unit of t in metres; twice as much is well.
+    pub turn_gain: f64,
+    /// The robot stops below this distance.
+    pub stop_distance: f64,
+    /// It also stops below this distance where the goal lies sideways.
+    pub sideways_distance: f64,
+    /// It starts again beyond this distance.
+    pub start_distance: f64,
+    /// Turning towards the goal fades out at this distance.
+    pub fade_distance: f64,
+    phase: Phase,
+}
+
+/// What the robot is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// Before the first command.
+    Start,
+    /// Driving with this sign `s`.
+    Driving(f64),
+    /// At the goal, turning to its heading.
+    Turning,
+}
+
+impl DifferentialDriveLaw {
+    /// The law with these gains, in m/s and rad/s, and the distances that were found best for pixel noise.
+    #[must_use]
+    pub fn new(speed_gain: f64, turn_gain: f64) -> Self {
+        Self {
+            speed_gain,
+            turn_gain,
+            stop_distance: 0.0015,
+            sideways_distance: 0.03,
+            start_distance: 0.12,
+            fade_distance: 0.02,
+            phase: Phase::Start,
+        }
+    }
+
+    /// The law as published, but for the signs: it stops driving below `stop_distance` and has no other precautions.
+    #[must_use]
+    pub fn as_published(speed_gain: f64, turn_gain: f64, stop_distance: f64) -> Self {
+        Self {
+            stop_distance,
+            sideways_distance: 0.0,
+            start_distance: stop_distance,
+            fade_distance: 0.0,
+            ..Self::new(speed_gain, turn_gain)
+        }
+    }
+
+    /// Whether the robot stands at the goal, and only turns.
+    #[must_use]
+    pub fn has_arrived(&self) -> bool {
+        self.phase == Phase::Turning
+    }
+
+    fn next_phase(&self, planar: &PlanarPose) -> Phase {
+        let r = planar.distance;
+        let ahead = planar.bearing.cos();
+        let direction = if ahead < 0.0 { -1.0 } else { 1.0 };
+        let at_goal =
+            r < self.stop_distance || (r < self.sideways_distance && r * ahead.abs() < self.stop_distance);
+        match self.phase {
+            Phase::Turning if r < self.start_distance => Phase::Turning,
+            _ if at_goal => Phase::Turning,
+            Phase::Driving(s) if ahead.abs() <= SIDEWAYS => Phase::Driving(s),
+            _ => Phase::Driving(direction),
+        }
+    }
+}
+
+impl Default for DifferentialDriveLaw {
+    /// 0.5 m/s and 0.6 rad/s.
+    fn default() -> Self {
+        Self::new(0.5, 0.6)
+    }
+}
+
+impl ControlLaw for DifferentialDriveLaw {
+    fn command(&mut self, pose: &RelativePose) -> Twist {
+        let planar = PlanarPose::new(pose);
+        self.phase = self.next_phase(&planar);
+        let PlanarPose { distance: r, bearing, heading } = planar;
+        match self.phase {
+            Phase::Driving(s) => {
+                let fade = r * r / (r * r + self.fade_distance * self.fade_distance);
+                Twist::drive(
+                    self.speed_gain * r.tanh() * bearing.cos(),
+                    self.turn_gain * s * bearing.sin() * fade,
+                )
+            }
+            Phase::Start | Phase::Turning => Twist::drive(0.0, -self.turn_gain * heading.sin()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plant::{DifferentialDrive, Plant};
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    /// The unit of t, in metres.
+    const UNIT: f64 = 2.0;
+
+    fn scaled(plant: &impl Plant) -> RelativePose {
+        let pose = plant.pose();
+        RelativePose::new(pose.q_21, pose.t_21 / UNIT)
+    }
+
+    /// `r²/2 + 1 − cos ψ`.
+    fn lyapunov(planar: &PlanarPose) -> f64 {
+        0.5 * planar.distance.powi(2) + 1.0 - planar.bearing.cos().abs()
+    }
+
+    /// What a run did.
+    struct Run {
+        end: DifferentialDrive,
+        /// The largest increase of V while driving.
+        increase: f64,
+        /// The largest change of the heading from the start.
+        excursion: f64,
+    }
+
+    fn run(mut robot: DifferentialDrive, mut law: impl ControlLaw + Clone, until: f64) -> Run {
+        const PERIOD: f64 = 0.02;
+        let start = robot.heading;
+        let (mut increase, mut excursion, mut before) = (f64::NEG_INFINITY, 0.0_f64, f64::INFINITY);
+        for _ in 0..6_000 {
+            let planar = PlanarPose::new(&scaled(&robot));
+            if planar.distance > until {
+                let v = lyapunov(&planar);
+                (increase, before) = (increase.max(v - before), v);
+            }
+            let twist = law.command(&scaled(&robot));
+            robot.advance(&twist, PERIOD);
+            excursion = excursion.max((robot.heading - start).abs());
+            if planar.distance <= until && robot.pose().q_21.angle() < 1e-3 {
+                break;
+            }
+        }
+        Run { end: robot, increase, excursion }
+    }
+
+    fn start(rng: &mut ChaCha8Rng) -> DifferentialDrive {
+        DifferentialDrive {
+            x: rng.random_range(-1.5..1.5),
+            z: rng.random_range(-1.5..1.5),
+            heading: rng.random_range(-PI..PI),
+        }
+    }
+
+    fn is_home(robot: &DifferentialDrive, distance: f64) -> bool {
+        robot.x.hypot(robot.z) <= distance && robot.pose().q_21.angle() < 0.01
+    }
+
+    #[test]
+    fn every_start_converges_and_v_decreases() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for k in 0..2_000 {
+            let robot = start(&mut rng);
+            let law = DifferentialDriveLaw::as_published(0.5, 0.6, 0.004);
+            let run = run(robot, law, 0.004);
+            assert!(is_home(&run.end, 0.004 * UNIT), "start {k}: {robot:?} to {:?}", run.end);
+            assert!(run.increase < 0.0, "start {k}: V grows by {:e}", run.increase);
+        }
+    }
+
+    #[test]
+    fn the_precautions_change_nothing_of_that() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for k in 0..500 {
+            let robot = start(&mut rng);
+            let run = run(robot, DifferentialDriveLaw::default(), 0.06);
+            assert!(is_home(&run.end, 0.06 * UNIT), "start {k}: {robot:?} to {:?}", run.end);
+            assert!(run.increase < 0.0, "start {k}: V grows by {:e}", run.increase);
+        }
+    }
+
+    /// The heading tells the right signs from those that arrive by turning round.
+    #[test]
+    fn the_paper_s_start_needs_little_turning() {
+        let robot = DifferentialDrive { x: 0.2, z: -0.8, heading: -20_f64.to_radians() };
+        let law = DifferentialDriveLaw::as_published(0.5, 0.6, 0.004);
+        let Run { end, excursion, .. } = run(robot, law, 0.004);
+        assert!(is_home(&end, 0.004 * UNIT), "{end:?}");
+        assert!(excursion.to_degrees() < 30.0, "{}", excursion.to_degrees());
+    }
+
+    /// Appendix C as printed: φ = atan2(tz, tx), ω = −k2 sin φ.
+    #[derive(Clone)]
+    struct Printed {
+        swapped: bool,
+        sign: f64,
+    }
+
+    impl ControlLaw for Printed {
+        fn command(&mut self, pose: &RelativePose) -> Twist {
+            let PlanarPose { distance, bearing, heading } = PlanarPose::new(pose);
+            let phi = if self.swapped { FRAC_PI_2 - bearing } else { bearing };
+            if distance < 0.004 {
+                return Twist::drive(0.0, -0.6 * heading.sin());
+            }
+            Twist::drive(0.5 * distance.tanh() * phi.cos(), self.sign * 0.6 * phi.sin())
+        }
+    }
+
+    #[test]
+    fn the_printed_bearing_never_arrives_and_the_printed_sign_turns_round() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for sign in [-1.0, 1.0] {
+            for _ in 0..100 {
+                let run = run(start(&mut rng), Printed { swapped: true, sign }, 0.004);
+                assert!(!is_home(&run.end, 0.05), "{:?}", run.end);
+            }
+        }
+        let robot = DifferentialDrive { x: 0.2, z: -0.8, heading: -20_f64.to_radians() };
+        let run = run(robot, Printed { swapped: false, sign: -1.0 }, 0.004);
+        assert!(run.excursion.to_degrees() > 120.0, "{}", run.excursion.to_degrees());
+    }
+
+    #[test]
+    fn the_planar_pose_is_what_the_plant_has() {
+        let robot = DifferentialDrive { x: 0.2, z: -0.8, heading: -0.35 };
+        let planar = PlanarPose::new(&robot.pose());
+        assert!((planar.heading + 0.35).abs() < 1e-15);
+        assert!((planar.distance - 0.2_f64.hypot(0.8)).abs() < 1e-15);
+        // The goal lies ahead and to the left, seen from the robot's place; it looks further to the left.
+        assert!((planar.bearing - ((-0.2_f64).atan2(0.8) + 0.35)).abs() < 1e-15);
+    }
+}

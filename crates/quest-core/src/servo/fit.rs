@@ -1,0 +1,329 @@
+//! One frame against the reference: the pose and the inverse depths that explain it best.
+//!
+//! Minimises, over the pose and all inverse depths ρ,
+//!
+//! ```text
+//! Σ |π(R m1 + ρ t) − m2|² / σ²  +  (ρ − ρ̂)ᵀ Λ (ρ − ρ̂)  +  γ (Σ (ρ − 1))²  (+ the plane's)
+//! ```
+//!
+//! where the first sum is over the features seen, `m1`, `m2` their images on the planes z = 1 of the goal and the current
+//! camera. The third term keeps the unit of length. Gauss–Newton with Levenberg's damping; the inverse depths are
+//! eliminated first, what is left for the pose is 6 × 6.
+
+use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+
+use super::reference::DepthReference;
+use crate::RelativePose;
+use crate::algebra::cholesky;
+
+/// The weight γ of the unit: a thousand times the information that one frame may have.
+const UNIT_WEIGHT: f64 = 1e10;
+/// Points nearer than this to the plane z = 0 of the current camera, in the unit of length, count as not seen.
+const NEAREST: f64 = 1e-3;
+const MAX_STEPS: usize = 20;
+
+/// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Of the tilt, in radians.
+    pub tilt: f64,
+    /// Of the height, in the unit of t.
+    pub height: f64,
+}
+
+/// What is known before a frame is looked at.
+pub(super) struct Known<'a> {
+    /// The goal's features on the plane z = 1.
+    pub(super) goal: &'a [[f64; 2]],
+    /// Standard deviation of a coordinate of `m2 − π(…)`.
+    pub(super) sigma: f64,
+    pub(super) plane: Option<Plane>,
+}
+
+/// Where a fit ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fitted {
+    pub(super) pose: RelativePose,
+    /// The whole cost: χ² of the images and of the reference.
+    pub(super) cost: f64,
+    /// Of a small rotation from the left, then of t.
+    pub(super) covariance: Matrix6<f64>,
+}
+
+/// The working memory of fits, for a number of features fixed at the start.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace {
+    /// The inverse depths of the last fit.
+    pub(super) inverse_depths: Vec<f64>,
+    trial: Vec<f64>,
+    /// The squared residuals of the features in the last fit, by the noise; infinite where not seen.
+    pub(super) squares: Vec<f64>,
+    hessian: Vec<f64>,
+    /// The mixed block, a row a feature: six columns of the pose, and the gradient.
+    mixed: Vec<[f64; 7]>,
+    solved: Vec<[f64; 7]>,
+    step: Vec<f64>,
+    /// The diagonal block of the inverse depths, from the images alone.
+    diagonal: Vec<f64>,
+    /// The pose's block.
+    pose_block: Matrix6<f64>,
+    gradient: Vector6<f64>,
+}
+
+impl Workspace {
+    pub(super) fn new(features: usize) -> Self {
+        Self {
+            inverse_depths: vec![1.0; features],
+            trial: vec![1.0; features],
+            squares: vec![0.0; features],
+            hessian: vec![0.0; features * features],
+            mixed: vec![[0.0; 7]; features],
+            solved: vec![[0.0; 7]; features],
+            step: vec![0.0; features],
+            diagonal: vec![0.0; features],
+            pose_block: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+        }
+    }
+
+    /// Fits from this pose and the reference's inverse depths. `frame` holds `None` for features that are not seen.
+    pub(super) fn fit(
+        &mut self,
+        known: &Known<'_>,
+        frame: &[Option<[f64; 2]>],
+        reference: &DepthReference,
+        start: RelativePose,
+    ) -> Option<Fitted> {
+        self.fit_from(known, frame, reference, start, &reference.inverse_depths)
+    }
+
+    /// The same from other inverse depths.
+    pub(super) fn fit_from(
+        &mut self,
+        known: &Known<'_>,
+        frame: &[Option<[f64; 2]>],
+        reference: &DepthReference,
+        start: RelativePose,
+        inverse_depths: &[f64],
+    ) -> Option<Fitted> {
+        self.inverse_depths.copy_from_slice(inverse_depths);
+        let mut pose = start;
+        let mut cost = self.linearise(known, frame, reference, &pose)?;
+        let mut damping = 0.0;
+        for _ in 0..MAX_STEPS {
+            let Some(step) = self.solve(reference, damping) else {
+                damping = f64::max(10.0 * damping, 1e-4);
+                continue;
+            };
+            let moved = moved(&pose, &step);
+            let kept = std::mem::take(&mut self.inverse_depths);
+            self.inverse_depths = std::mem::take(&mut self.trial);
+            for ((new, old), by) in self.inverse_depths.iter_mut().zip(&kept).zip(&self.step) {
+                *new = old + by;
+            }
+            let change = self.cost(known, frame, reference, &moved).map(|new| cost - new);
+            match change {
+                Some(change) if change >= 0.0 => {
+                    self.trial = kept;
+                    pose = moved;
+                    cost = self.linearise(known, frame, reference, &pose)?;
+                    damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
+                    if change <= 1e-4 * cost + 1e-9 {
+                        break;
+                    }
+                }
+                _ => {
+                    self.trial = std::mem::replace(&mut self.inverse_depths, kept);
+                    damping = f64::max(10.0 * damping, 1e-4);
+                    // No smaller cost in the direction of the gradient: this is the minimum, to rounding.
+                    if damping > 1e6 || step.norm() < 1e-12 {
+                        break;
+                    }
+                }
+            }
+        }
+        // The last trial may have been refused: the residuals are those of the pose that is returned.
+        self.cost(known, frame, reference, &pose)?;
+        let covariance = self.marginal(reference)?;
+        Some(Fitted { pose, cost, covariance })
+    }
+
+    /// The residuals and the cost, at the workspace's inverse depths; `None` where a seen point is behind the camera.
+    fn cost(
+        &mut self,
+        known: &Known<'_>,
+        frame: &[Option<[f64; 2]>],
+        reference: &DepthReference,
+        pose: &RelativePose,
+    ) -> Option<f64> {
+        let r_21 = pose.r_21();
+        let mut cost = known.plane.map_or(0.0, |plane| plane_residuals(&plane, pose).0.norm_squared());
+        for (i, (goal, image)) in known.goal.iter().zip(frame).enumerate() {
+            let rho = self.inverse_depths[i];
+            cost += reference.pull(i, &self.inverse_depths) * (rho - reference.inverse_depths[i]);
+            self.squares[i] = f64::INFINITY;
+            let Some(image) = image else { continue };
+            let x2 = r_21 * Vector3::new(goal[0], goal[1], 1.0) + pose.t_21 * rho;
+            if x2.z < NEAREST {
+                return None;
+            }
+            let off = [x2.x / x2.z - image[0], x2.y / x2.z - image[1]].map(|e| e / known.sigma);
+            self.squares[i] = off[0] * off[0] + off[1] * off[1];
+            cost += self.squares[i];
+        }
+        let drift: f64 = self.inverse_depths.iter().map(|rho| rho - 1.0).sum();
+        cost += UNIT_WEIGHT * drift * drift;
+        cost.is_finite().then_some(cost)
+    }
+
+    /// The normal equations at this pose and the workspace's inverse depths, and the cost.
+    fn linearise(
+        &mut self,
+        known: &Known<'_>,
+        frame: &[Option<[f64; 2]>],
+        reference: &DepthReference,
+        pose: &RelativePose,
+    ) -> Option<f64> {
+        let cost = self.cost(known, frame, reference, pose)?;
+        let r_21 = pose.r_21();
+        let drift: f64 = self.inverse_depths.iter().map(|rho| rho - 1.0).sum();
+        (self.pose_block, self.gradient) = (Matrix6::zeros(), Vector6::zeros());
+        if let Some(plane) = &known.plane {
+            let (residuals, jacobian) = plane_residuals(plane, pose);
+            self.pose_block += jacobian.transpose() * jacobian;
+            self.gradient += jacobian.transpose() * residuals;
+        }
+        for (i, (goal, image)) in known.goal.iter().zip(frame).enumerate() {
+            let rho = self.inverse_depths[i];
+            let pull = reference.pull(i, &self.inverse_depths) + UNIT_WEIGHT * drift;
+            (self.mixed[i], self.diagonal[i]) = ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, pull], 0.0);
+            let Some(image) = image else { continue };
+            let c = r_21 * Vector3::new(goal[0], goal[1], 1.0);
+            let x2 = c + pose.t_21 * rho;
+            let weight = 1.0 / (x2.z * known.sigma);
+            let u = [x2.x / x2.z, x2.y / x2.z];
+            let rows = [Vector3::new(weight, 0.0, -u[0] * weight), Vector3::new(0.0, weight, -u[1] * weight)];
+            for (row, off) in rows.iter().zip([u[0] - image[0], u[1] - image[1]]) {
+                let off = off / known.sigma;
+                let (by_turn, by_t, by_rho) = (c.cross(row), row * rho, row.dot(&pose.t_21));
+                let j = Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_t.x, by_t.y, by_t.z);
+                self.pose_block.ger(1.0, &j, &j, 1.0);
+                self.gradient += j * off;
+                self.diagonal[i] += by_rho * by_rho;
+                self.mixed[i][6] += by_rho * off;
+                for (m, j) in self.mixed[i].iter_mut().zip(&j) {
+                    *m += by_rho * j;
+                }
+            }
+        }
+        Some(cost)
+    }
+
+    /// The step of the pose; that of the inverse depths is left in `step`.
+    fn solve(&mut self, reference: &DepthReference, damping: f64) -> Option<Vector6<f64>> {
+        let (schur, gradient) = self.eliminate(reference, damping)?;
+        let step = schur.cholesky()?.solve(&-gradient);
+        for (out, row) in self.step.iter_mut().zip(&self.solved) {
+            *out = -(row[6] + row[..6].iter().zip(&step).map(|(y, s)| y * s).sum::<f64>());
+        }
+        cholesky::solve_upper(&self.hessian, &mut self.step);
+        step.iter().chain(&self.step).all(|s| s.is_finite()).then_some(step)
+    }
+
+    /// The covariance of the pose, the inverse depths being as uncertain as they are.
+    fn marginal(&mut self, reference: &DepthReference) -> Option<Matrix6<f64>> {
+        self.eliminate(reference, 0.0)?.0.cholesky().map(|schur| schur.inverse())
+    }
+
+    /// The equations of the pose once the inverse depths are eliminated.
+    fn eliminate(
+        &mut self,
+        reference: &DepthReference,
+        damping: f64,
+    ) -> Option<(Matrix6<f64>, Vector6<f64>)> {
+        let n = self.diagonal.len();
+        for (h, w) in self.hessian.iter_mut().zip(&reference.information) {
+            *h = w + UNIT_WEIGHT;
+        }
+        for i in 0..n {
+            self.hessian[i * n + i] += self.diagonal[i] * (1.0 + damping);
+        }
+        if !cholesky::factor(&mut self.hessian, n) {
+            return None;
+        }
+        self.solved.copy_from_slice(&self.mixed);
+        cholesky::solve_lower(&self.hessian, &mut self.solved);
+        let (mut schur, mut gradient) = (self.pose_block, self.gradient);
+        for k in 0..6 {
+            schur[(k, k)] += damping * self.pose_block[(k, k)];
+        }
+        for row in &self.solved {
+            let y = Vector6::from_row_slice(&row[..6]);
+            schur.ger(-1.0, &y, &y, 1.0);
+            gradient -= y * row[6];
+        }
+        Some((schur, gradient))
+    }
+
+    /// Adds to the reference what the last fit has to say of the inverse depths, as `weight` frames.
+    ///
+    /// With `S` the information of the images, the pose being unknown, the fit is the minimum ρ* of
+    /// `(ρ − ρ̂)ᵀ Λ (ρ − ρ̂)` and a parabola of curvature S; its gradient at ρ̂ is `(Λ + S) (ρ* − ρ̂)`. Weighted, both enter the
+    /// reference: `Λ' = Λ + w S`, `ρ̂' = ρ̂ + Λ'⁻¹ w (Λ + S) (ρ* − ρ̂)`.
+    pub(super) fn update(&mut self, reference: &mut DepthReference, weight: f64) {
+        let n = reference.len();
+        let Some(pose_block) = self.pose_block.cholesky() else { return };
+        for i in 0..n {
+            self.step[i] = weight * reference.pull(i, &self.inverse_depths);
+        }
+        for i in 0..n {
+            let row = pose_block.solve(&Vector6::from_row_slice(&self.mixed[i][..6]));
+            for k in 0..n {
+                let through_pose: f64 = row.iter().zip(&self.mixed[k][..6]).map(|(a, b)| a * b).sum();
+                let s = weight * (if i == k { self.diagonal[i] } else { 0.0 } - through_pose);
+                self.step[i] += s * (self.inverse_depths[k] - reference.inverse_depths[k]);
+                self.hessian[i * n + k] = reference.information[i * n + k] + s;
+            }
+        }
+        reference.information.copy_from_slice(&self.hessian);
+        self.hessian.iter_mut().for_each(|h| *h += UNIT_WEIGHT);
+        if !cholesky::factor(&mut self.hessian, n) {
+            return;
+        }
+        for (solved, step) in self.solved.iter_mut().zip(&self.step) {
+            *solved = [*step, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        }
+        cholesky::solve_lower(&self.hessian, &mut self.solved);
+        for (step, solved) in self.step.iter_mut().zip(&self.solved) {
+            *step = solved[0];
+        }
+        cholesky::solve_upper(&self.hessian, &mut self.step);
+        for (rho, step) in reference.inverse_depths.iter_mut().zip(&self.step) {
+            *rho += step;
+        }
+    }
+}
+
+/// The pose after a small rotation from the left and a change of t.
+fn moved(pose: &RelativePose, step: &Vector6<f64>) -> RelativePose {
+    let turn = UnitQuaternion::new(Vector3::new(step[0], step[1], step[2]));
+    let q_21 = UnitQuaternion::new_normalize((turn * pose.q_21).into_inner());
+    RelativePose::new(q_21, pose.t_21 + Vector3::new(step[3], step[4], step[5]))
+}
+
+/// How far a pose leaves the plane, by its deviations: the tilt of the vertical to the side and ahead, the height; and their
+/// derivatives.
+fn plane_residuals(plane: &Plane, pose: &RelativePose) -> (Vector3<f64>, nalgebra::Matrix3x6<f64>) {
+    let vertical = pose.q_21 * Vector3::y();
+    let residuals =
+        Vector3::new(vertical.x / plane.tilt, vertical.z / plane.tilt, pose.t_21.y / plane.height);
+    // The vertical changes by turn × vertical.
+    let by_turn = -vertical.cross_matrix() / plane.tilt;
+    let mut jacobian = nalgebra::Matrix3x6::zeros();
+    for k in 0..3 {
+        jacobian[(0, k)] = by_turn[(0, k)];
+        jacobian[(1, k)] = by_turn[(2, k)];
+    }
+    jacobian[(2, 4)] = 1.0 / plane.height;
+    (residuals, jacobian)
+}

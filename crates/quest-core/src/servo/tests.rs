@@ -1,0 +1,226 @@
+//! The closed loop.
+
+use super::scenario::{self, Features};
+use super::*;
+use crate::RelativePose;
+use crate::solver::SolverName;
+use rand_chacha::ChaCha8Rng;
+
+const LIMITS: Limits = Limits { speed: 0.5, turn_rate: 0.6 };
+
+/// A plane that a robot keeps to exactly.
+const PLANE: Plane = Plane { tilt: 0.002, height: 0.001 };
+
+fn filter(world: &World, goal: &[[f64; 2]], plane: Option<Plane>) -> DepthFilter<SolverName> {
+    let options = FilterOptions { plane, ..world.filter_options(&LIMITS, 2.0) };
+    DepthFilter::new(goal, SolverName::Quest, options)
+}
+
+fn robot(rng: &mut ChaCha8Rng, count: usize, disturbances: &Disturbances) -> (World, DifferentialDrive) {
+    scenario::random(Features::General, count, disturbances, rng, |_| {
+        scenario::robot_start(Features::General)
+    })
+}
+
+/// All records of a run.
+fn records<P: Plant, E: PoseEstimator, L: ControlLaw>(
+    world: &World,
+    plant: &mut P,
+    mut servo: Servo<E, L>,
+    images: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Record> {
+    let mut all = Vec::new();
+    world.run(plant, &mut servo, images, rng, |record| {
+        all.push(record.clone());
+        true
+    });
+    all
+}
+
+fn harmonic_mean(world: &World) -> f64 {
+    world.points.len() as f64 / world.points.iter().map(|x| 1.0 / x.z).sum::<f64>()
+}
+
+#[test]
+fn the_paper_s_camera_arrives() {
+    let (world, mut camera) = scenario::paper();
+    let rng = &mut scenario::generator(1, 0);
+    let goal = world.on_plane(&world.goal_pixels(rng));
+    let servo = Servo::new(
+        &goal,
+        filter(&world, &goal, None),
+        FreeCameraLaw { rate: 0.25, unit: 2.0 },
+        Safety::new(LIMITS),
+    );
+    let all = records(&world, &mut camera, servo, 1_400, rng);
+    let estimates: Vec<_> = all.iter().map(|r| r.step.estimate.unwrap().pose).collect();
+    // (10.1), rounded as printed there, in the unit of the goal's depths.
+    let unit = harmonic_mean(&world);
+    let first = &estimates[0];
+    let printed = [0.943, -0.110, -0.223, -0.221];
+    assert!(first.wxyz().iter().zip(printed).all(|(a, b)| (a - b).abs() < 6e-4), "{:?}", first.wxyz());
+    let millimetres = first.t_21 * unit * 1000.0;
+    let printed = nalgebra::Vector3::new(1097.0, -640.0, -47.0);
+    assert!((millimetres - printed).amax() < 1.0, "{millimetres}");
+    // The right candidate in all frames, and the same unit: the prior on the depths pulls less than 1e-4.
+    for (record, estimate) in all.iter().zip(&estimates) {
+        assert!(record.truth.rotation_error(estimate) < 1e-4, "at {}", record.time);
+        assert!((record.truth.t_21 - estimate.t_21 * unit).norm() < 1e-3 * record.truth.t_21.norm() + 1e-9);
+    }
+    let end = camera.pose();
+    assert!(end.t_21.norm() < 1e-4 && end.q_21.angle().to_degrees() < 0.01, "{end:?}");
+}
+
+#[test]
+fn the_printed_depths_are_those_of_the_scene() {
+    let (world, _) = scenario::paper();
+    let sum: f64 = world.points.iter().map(|x| x.z).sum();
+    let printed = [0.178, 0.175, 0.180, 0.233, 0.233];
+    for (x, printed) in world.points.iter().zip(printed) {
+        // The printed depths add up to 0.999.
+        assert!((x.z / sum - printed).abs() < 6e-4);
+    }
+}
+
+#[test]
+fn robots_arrive_without_noise_and_with_it() {
+    for (noise_px, count) in [(0.0, 5), (0.5, 20)] {
+        let disturbances = Disturbances { noise_px, rounded: noise_px > 0.0, ..Disturbances::default() };
+        for index in 0..10 {
+            let rng = &mut scenario::generator(2, index);
+            let (world, mut plant) = robot(rng, count, &disturbances);
+            let goal = world.on_plane(&world.goal_pixels(rng));
+            let servo = Servo::new(
+                &goal,
+                filter(&world, &goal, Some(PLANE)),
+                DifferentialDriveLaw::default(),
+                Safety { border: world.border(15.0), ..Safety::new(LIMITS) },
+            );
+            let all = records(&world, &mut plant, servo, 500, rng);
+            assert!(plant.x.hypot(plant.z) < 0.02, "{index}: {plant:?}");
+            assert!(plant.heading.abs().to_degrees() < 1.0, "{index}: {plant:?}");
+            assert!(all.iter().all(|r| r.step.estimate.is_ok()), "{index}");
+        }
+    }
+}
+
+/// Normalised by the goal's depths the unit of t stays, by both views' depths it changes, and an essential matrix has none.
+#[test]
+fn only_the_goal_s_depths_give_a_constant_unit() {
+    let (world, _) = scenario::paper();
+    let camera = FreeCamera::new(scenario::robot_start(Features::General).pose());
+    let ratios = |length| {
+        let rng = &mut scenario::generator(3, 0);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let mut estimator = PerFrame::new(&goal, SolverName::Quest, Choice::Reprojection, length);
+        estimator.set_depths(&world.points.iter().map(|x| x.z).collect::<Vec<_>>());
+        let mut moving = camera;
+        let mut law = FreeCameraLaw { rate: 0.25, unit: 2.0 };
+        let mut ratios = Vec::new();
+        for _ in 0..200 {
+            let pose = moving.pose();
+            let features: Vec<_> = world
+                .points
+                .iter()
+                .map(|x| pose.q_21 * x + pose.t_21)
+                .map(|x| Some([x.x / x.z, x.y / x.z]))
+                .collect();
+            let estimate = estimator.estimate(&features).unwrap().pose;
+            ratios.push(pose.t_21.norm() / estimate.t_21.norm());
+            moving.advance(&law.command(&RelativePose::new(pose.q_21, pose.t_21 / 2.0)), world.period);
+        }
+        let (least, most) = ratios.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &x| (a.min(x), b.max(x)));
+        most / least
+    };
+    assert!(ratios(Length::GoalDepths) - 1.0 < 1e-9, "{}", ratios(Length::GoalDepths));
+    assert!(ratios(Length::BothViews) > 1.05, "{}", ratios(Length::BothViews));
+    assert!(ratios(Length::Unit) > 3.0, "{}", ratios(Length::Unit));
+}
+
+/// Down to four features and back: it stands still, says why, and goes on.
+#[test]
+fn lost_features_hold_and_found_ones_resume() {
+    for found in [4, 0] {
+        let lost = Some((30..60, found));
+        let disturbances = Disturbances { noise_px: 0.5, rounded: true, lost, ..Disturbances::default() };
+        let rng = &mut scenario::generator(4, 0);
+        let (world, mut plant) = robot(rng, 20, &disturbances);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let law = DifferentialDriveLaw::default();
+        let servo = Servo::new(&goal, filter(&world, &goal, Some(PLANE)), law, Safety::new(LIMITS));
+        for (index, record) in records(&world, &mut plant, servo, 500, rng).iter().enumerate() {
+            let Step { command, estimate } = &record.step;
+            if (30..60).contains(&index) {
+                assert_eq!(estimate.unwrap_err(), HoldReason::TooFewFeatures);
+                assert_eq!(*command, Twist::zero());
+            } else {
+                assert!(estimate.is_ok(), "{index}: {estimate:?}");
+            }
+        }
+        assert!(plant.x.hypot(plant.z) < 0.02 && plant.heading.abs() < 0.02, "{plant:?}");
+    }
+}
+
+/// Anything at all in place of an image: commands are finite and within the limits.
+#[test]
+fn no_image_makes_a_wild_command() {
+    use rand::RngExt;
+    let rng = &mut scenario::generator(5, 0);
+    for round in 0..20 {
+        let (world, _) = robot(rng, 6, &Disturbances { noise_px: 0.5, ..Disturbances::default() });
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let law = FreeCameraLaw { rate: 10.0, unit: 5.0 };
+        let mut servo = Servo::new(&goal, filter(&world, &goal, None), law, Safety::new(LIMITS));
+        for _ in 0..100 {
+            let mut coordinate = || match rng.random_range(0..12) {
+                0 => f64::NAN,
+                1 => f64::INFINITY,
+                2 => 1e300,
+                3 => 0.0,
+                _ => rng.random_range(-1.0..1.0),
+            };
+            let mut image: Vec<_> = (0..6).map(|_| Some([coordinate(), coordinate()])).collect();
+            if round % 2 == 0 {
+                image.pop();
+            }
+            let Step { command, estimate } = servo.step(&image);
+            assert!(command.is_finite());
+            assert!(command.linear.norm() <= LIMITS.speed && command.angular.norm() <= LIMITS.turn_rate);
+            assert!(estimate.is_ok() || command == Twist::zero());
+        }
+    }
+}
+
+/// Turning gives way to features at the border.
+#[test]
+fn turns_do_not_push_features_out() {
+    struct Fixed(f64);
+    impl ControlLaw for Fixed {
+        fn command(&mut self, _: &RelativePose) -> Twist {
+            Twist::drive(0.1, self.0)
+        }
+    }
+    struct Still;
+    impl PoseEstimator for Still {
+        fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason> {
+            Ok(Estimate {
+                pose: RelativePose::identity(),
+                covariance: nalgebra::Matrix6::zeros(),
+                inliers: features.len(),
+                residual: 0.0,
+                alternatives: 1,
+            })
+        }
+    }
+    let safety = Safety { border: Some(Border { left: -0.5, right: 0.5 }), ..Safety::new(LIMITS) };
+    let turn = |goal: [f64; 2], now: [f64; 2], rate| {
+        Servo::new(&[goal], Still, Fixed(rate), safety).step(&[Some(now)]).command.angular.y
+    };
+    // To the right, features move to the left: one that is out there is brought back.
+    assert!(turn([0.0, 0.0], [-0.55, 0.0], 0.2) < -0.1);
+    assert!((turn([0.0, 0.0], [-0.55, 0.0], -0.2) + 0.2).abs() < 1e-15);
+    assert!((turn([0.0, 0.0], [-0.45, 0.0], 0.2) - 0.2).abs() < 1e-15);
+    assert!((turn([-0.6, 0.0], [-0.55, 0.0], 0.2) - 0.2).abs() < 1e-15);
+    assert!(turn([0.0, 0.0], [0.55, 0.0], -0.2) > 0.1);
+}

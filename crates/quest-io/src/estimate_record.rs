@@ -1,0 +1,183 @@
+//! The result of a robust estimate as it stands in files.
+
+use quest_core::RelativePose;
+use quest_core::robust::{Estimate, Evidence, RunnerUp};
+use serde::Serialize;
+
+use crate::Truth;
+use crate::record::{rows, unsigned_zero};
+
+/// The result of one estimate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EstimateRecord {
+    /// What the input calls the pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// A name of [`quest_core::robust::Model`]; `None` where no pose could be found.
+    pub model: Option<&'static str>,
+    /// Why there is no pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// What was found.
+    #[serde(flatten)]
+    pub found: Option<FoundRecord>,
+    /// How long it took, in milliseconds.
+    pub elapsed_ms: f64,
+    /// The angle in degrees to the true rotation, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_error_deg: Option<f64>,
+    /// The angle in degrees to the true direction of translation, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub translation_error_deg: Option<f64>,
+}
+
+/// What an estimate found. Fields as those of [`Estimate`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundRecord {
+    /// The pose.
+    #[serde(flatten)]
+    pub pose: PoseRecord,
+    /// The rows of the covariance of rotation vector (radians) and translation.
+    pub covariance: [[f64; 6]; 6],
+    /// One a match.
+    pub inliers: Vec<bool>,
+    /// How many are inliers.
+    pub inlier_count: usize,
+    /// From zero to one.
+    pub score: f64,
+    /// Samples drawn.
+    pub iterations: usize,
+    /// The other pose that the matches may mean.
+    pub runner_up: Option<RunnerUpRecord>,
+    /// How well each model fits.
+    pub evidence: EvidenceRecord,
+    /// The noise of the inliers, in pixels (without cameras, in units of the plane `z = 1`).
+    pub noise_px: f64,
+}
+
+/// A pose, `X2 = R_21 X1 + t_21`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PoseRecord {
+    /// The rotation as a unit quaternion `w, x, y, z` with `w >= 0`.
+    pub q_21: [f64; 4],
+    /// The rows of the rotation matrix.
+    #[serde(rename = "R_21")]
+    pub r_21: [[f64; 3]; 3],
+    /// The translation; the mean absolute depth over both views is 1.
+    pub t_21: [f64; 3],
+    /// Its length.
+    pub parallax: f64,
+}
+
+/// Another pose that the matches may mean.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunnerUpRecord {
+    /// The pose.
+    #[serde(flatten)]
+    pub pose: PoseRecord,
+    /// From zero to one.
+    pub score: f64,
+    /// Its inliers.
+    pub inlier_count: usize,
+    /// The angle in degrees to the true rotation, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_error_deg: Option<f64>,
+    /// The angle in degrees to the true direction of translation, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub translation_error_deg: Option<f64>,
+}
+
+/// The median residual of the inliers under each model, in pixels; `None` where the model could not be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EvidenceRecord {
+    /// A rotation without translation.
+    pub rotation_px: Option<f64>,
+    /// A plane.
+    pub planar_px: Option<f64>,
+    /// The essential matrix.
+    pub general_px: Option<f64>,
+}
+
+impl EstimateRecord {
+    /// The record of an estimate.
+    #[must_use]
+    pub fn new(name: Option<String>, estimate: &Estimate, truth: &Truth, elapsed_ms: f64) -> Self {
+        let pose = &estimate.pose;
+        Self {
+            name,
+            model: Some(estimate.model.name()),
+            reason: None,
+            found: Some(FoundRecord::new(estimate, truth)),
+            elapsed_ms,
+            rotation_error_deg: truth.rotation_error_deg(pose),
+            translation_error_deg: truth.translation_error_deg(pose),
+        }
+    }
+
+    /// The record of matches that gave no pose.
+    #[must_use]
+    pub fn no_pose(name: Option<String>, reason: String, elapsed_ms: f64) -> Self {
+        Self {
+            name,
+            model: None,
+            reason: Some(reason),
+            found: None,
+            elapsed_ms,
+            rotation_error_deg: None,
+            translation_error_deg: None,
+        }
+    }
+}
+
+impl FoundRecord {
+    fn new(estimate: &Estimate, truth: &Truth) -> Self {
+        let covariance = &estimate.covariance;
+        Self {
+            pose: PoseRecord::new(&estimate.pose),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| unsigned_zero(covariance[(i, j)]))),
+            inliers: estimate.inliers.clone(),
+            inlier_count: estimate.inlier_count,
+            score: estimate.score,
+            iterations: estimate.iterations,
+            runner_up: estimate.runner_up.as_ref().map(|other| RunnerUpRecord::new(other, truth)),
+            evidence: EvidenceRecord::new(&estimate.evidence),
+            noise_px: estimate.noise_px,
+        }
+    }
+}
+
+impl PoseRecord {
+    /// The record of a pose.
+    #[must_use]
+    pub fn new(pose: &RelativePose) -> Self {
+        Self {
+            q_21: pose.wxyz().map(unsigned_zero),
+            r_21: rows(&pose.r_21()),
+            t_21: <[f64; 3]>::from(pose.t_21).map(unsigned_zero),
+            parallax: pose.t_21.norm(),
+        }
+    }
+}
+
+impl RunnerUpRecord {
+    fn new(other: &RunnerUp, truth: &Truth) -> Self {
+        Self {
+            pose: PoseRecord::new(&other.pose),
+            score: other.score,
+            inlier_count: other.inlier_count,
+            rotation_error_deg: truth.rotation_error_deg(&other.pose),
+            translation_error_deg: truth.translation_error_deg(&other.pose),
+        }
+    }
+}
+
+impl EvidenceRecord {
+    fn new(evidence: &Evidence) -> Self {
+        let finite = |x: f64| x.is_finite().then_some(x);
+        Self {
+            rotation_px: finite(evidence.rotation_px),
+            planar_px: finite(evidence.planar_px),
+            general_px: finite(evidence.general_px),
+        }
+    }
+}

@@ -1,0 +1,455 @@
+//! `estimate`: one pose from matches with outliers.
+
+use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3};
+use numpy::{PyArray1, PyArray2, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use quest_core::RelativePose;
+use quest_core::robust::{self, Evidence, KnownDirection, Model, Options, Priors};
+
+use crate::arrays;
+use crate::candidate::canonical;
+use crate::errors::{self, QuestError};
+use crate::solve::{Views, solver_named};
+
+/// One pose from matches with outliers.
+///
+/// Parameters
+/// ----------
+/// x1, x2 : array_like of shape (N, 2) or (N, 3)
+///     The same N points in view 1 and in view 2: pixels where cameras are given, otherwise points on the plane
+///     z = 1 of each camera. Three numbers a row are bearings of any length, and take no camera.
+/// camera1, camera2 : Camera or array_like of shape (3, 3), optional
+///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
+/// threshold : float, optional
+///     Matches with a Sampson error below this are inliers, in pixels, 1 by default. Without cameras in units of
+///     the plane z = 1, in radians for bearings; it has to be given then.
+/// confidence : float
+///     How sure to be that a sample without outliers was seen before the search stops.
+/// min_iterations, max_iterations : int
+///     At least and at most so many samples are drawn.
+/// seed : int
+///     The same seed gives the same answer, bit for bit.
+/// solver : str, optional
+///     The solver of the samples, one of the names in ``solvers()``; the first of them where absent.
+/// scores : array_like of shape (N,), optional
+///     One a match, higher is better: the best matches are tried first.
+/// initial_pose : (array_like of shape (3, 3), array_like of shape (3,)), optional
+///     A rotation and a translation to begin with.
+/// known_direction : (array_like of shape (3,), array_like of shape (3,), float), optional
+///     A direction in space in the frame of camera 1 and in that of camera 2, such as gravity or (twice the same) the
+///     axis of the rotation, and how far a pose may turn one from the other, in radians.
+///
+/// Returns
+/// -------
+/// Estimate
+///
+/// Raises
+/// ------
+/// NoPose
+///     Where the best pose agrees with no more matches than chance explains. With fewer than ten matches the best
+///     pose is always returned, with its runner-up.
+/// TooFewMatches
+///     For fewer than five matches, or than the solver takes.
+/// NotFinite, ShapeMismatch, DegenerateInput, BadCamera
+///     As ``solve``.
+/// QuestError
+///     The base of these, itself for an impossible option.
+///
+/// Notes
+/// -----
+/// The lock of the interpreter is released while the search runs.
+#[pyfunction]
+#[pyo3(signature = (
+    x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
+    seed=0, solver=None, scores=None, initial_pose=None, known_direction=None
+))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn estimate(
+    py: Python<'_>,
+    x1: &Bound<'_, PyAny>,
+    x2: &Bound<'_, PyAny>,
+    camera1: Option<&Bound<'_, PyAny>>,
+    camera2: Option<&Bound<'_, PyAny>>,
+    threshold: Option<f64>,
+    confidence: f64,
+    min_iterations: usize,
+    max_iterations: usize,
+    seed: u64,
+    solver: Option<&str>,
+    scores: Option<&Bound<'_, PyAny>>,
+    initial_pose: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+    known_direction: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>, f64)>,
+) -> PyResult<Estimate> {
+    let solver = solver_named(solver)?;
+    let views = Views::new(x1, x2, camera1, camera2)?;
+    let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
+    let pose = initial_pose.as_ref().map(pose).transpose()?;
+    let direction = known_direction.as_ref().map(direction).transpose()?;
+    let options = Options {
+        threshold: threshold_for(views.cameras().is_some(), threshold)?,
+        confidence,
+        min_iterations,
+        max_iterations,
+        seed,
+        solver,
+        ..Options::default()
+    };
+    let options = match views.cameras() {
+        Some([camera1, camera2]) => options.with_cameras(camera1, camera2),
+        None => options,
+    };
+    let found = py.detach(|| {
+        let matches = views.matches().map_err(|error| errors::input(&error))?;
+        let priors = Priors { scores: scores.as_deref(), pose, direction };
+        robust::estimate_with(&matches, &options, &priors).map_err(|error| errors::estimate(&error))
+    })?;
+    Ok(Estimate::new(&found))
+}
+
+/// The threshold: one pixel where there are cameras.
+pub(crate) fn threshold_for(has_cameras: bool, threshold: Option<f64>) -> PyResult<f64> {
+    threshold.or_else(|| has_cameras.then_some(1.0)).ok_or_else(|| {
+        QuestError::new_err(
+            "neither cameras nor a threshold are given, expected cameras, or a threshold in units of the plane z = 1 \
+             (radians for bearings)",
+        )
+    })
+}
+
+fn pose((r, t): &(Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<RelativePose> {
+    let rows = arrays::matrix3("initial_pose[0]", r)?;
+    let t = vector3("initial_pose[1]", t)?;
+    // nalgebra keeps columns, NumPy rows.
+    let matrix = nalgebra::Matrix3::from(rows).transpose();
+    let is_rotation = (matrix * matrix.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-6
+        && matrix.determinant() > 0.0;
+    if !is_rotation {
+        return Err(QuestError::new_err(
+            "initial_pose[0] is not a rotation matrix, expected R with R Rᵀ = I",
+        ));
+    }
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(matrix);
+    Ok(RelativePose::new(UnitQuaternion::from_rotation_matrix(&rotation), t))
+}
+
+fn direction(
+    (first, second, tolerance): &(Bound<'_, PyAny>, Bound<'_, PyAny>, f64),
+) -> PyResult<KnownDirection> {
+    Ok(KnownDirection {
+        in_view1: vector3("known_direction[0]", first)?,
+        in_view2: vector3("known_direction[1]", second)?,
+        tolerance: *tolerance,
+    })
+}
+
+fn vector3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
+    let numbers: [f64; 3] = arrays::vector(name, given)?.try_into().map_err(|v: Vec<f64>| {
+        errors::ShapeMismatch::new_err(format!("{name} has the shape ({},), expected (3,)", v.len()))
+    })?;
+    Ok(numbers.into())
+}
+
+type PoseState = ([f64; 4], [f64; 3]);
+
+fn pose_state(pose: &RelativePose) -> PoseState {
+    (pose.wxyz(), pose.t_21.into())
+}
+
+fn pose_from(([w, i, j, k], t): PoseState) -> RelativePose {
+    RelativePose::new(UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)), t.into())
+}
+
+fn rotation_rows(pose: &RelativePose) -> Vec<[f64; 3]> {
+    // nalgebra keeps columns, NumPy rows.
+    let rows: [[f64; 3]; 3] = pose.r_21().transpose().into();
+    rows.to_vec()
+}
+
+fn set_pose(dict: &Bound<'_, PyDict>, pose: &RelativePose) -> PyResult<()> {
+    dict.set_item("q_21", pose.wxyz().to_vec())?;
+    dict.set_item("R_21", rotation_rows(pose).into_iter().map(Vec::from).collect::<Vec<_>>())?;
+    dict.set_item("t_21", pose.t_21.as_slice())?;
+    dict.set_item("parallax", pose.t_21.norm())
+}
+
+/// Another pose that the matches of an estimate may mean: ``X2 = R @ X1 + t``.
+#[pyclass(frozen, eq, module = "quest_pose")]
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RunnerUp {
+    pose: RelativePose,
+    /// float : How well the pose explains all matches, from 0 to 1.
+    #[pyo3(get)]
+    score: f64,
+    /// int : How many matches are within the threshold and in front of both cameras.
+    #[pyo3(get)]
+    inlier_count: usize,
+}
+
+type RunnerUpState = (PoseState, f64, usize);
+
+/// The runner-up that ``RunnerUp.__reduce__`` took apart.
+#[pyfunction]
+pub(crate) fn _runner_up(state: RunnerUpState) -> RunnerUp {
+    RunnerUp { pose: pose_from(state.0), score: state.1, inlier_count: state.2 }
+}
+
+impl RunnerUp {
+    fn state(&self) -> RunnerUpState {
+        (pose_state(&self.pose), self.score, self.inlier_count)
+    }
+}
+
+#[pymethods]
+impl RunnerUp {
+    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
+    #[getter]
+    #[pyo3(name = "R")]
+    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::to_numpy(py, rotation_rows(&self.pose))
+    }
+
+    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.t_21.as_slice().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
+    #[getter]
+    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.wxyz().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The same quaternion scalar last.
+    #[getter]
+    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let [w, x, y, z] = self.pose.wxyz();
+        [x, y, z, w].to_pyarray(py)
+    }
+
+    /// float : The length of ``t``.
+    #[getter]
+    fn parallax(&self) -> f64 {
+        self.pose.t_21.norm()
+    }
+
+    /// The runner-up as plain numbers and lists, ready for ``json.dumps``.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        set_pose(&dict, &self.pose)?;
+        dict.set_item("score", self.score)?;
+        dict.set_item("inlier_count", self.inlier_count)?;
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        let (q, t) = (self.pose.wxyz(), self.pose.t_21.as_slice());
+        format!(
+            "<RunnerUp: quat_wxyz={q:.6?}, t={t:.6?}, inlier_count={}, score={:.3}>",
+            self.inlier_count, self.score
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (RunnerUpState,))> {
+        Ok((py.import("quest_pose._core")?.getattr("_runner_up")?, (self.state(),)))
+    }
+}
+
+/// One pose from matches with outliers, as ``estimate`` returns it: ``X2 = R @ X1 + t``.
+///
+/// The mean absolute depth of the inliers over both views is 1, so that the length of ``t`` is the parallax. An estimate never
+/// changes: its arrays are fresh copies at each access.
+#[pyclass(frozen, eq, module = "quest_pose")]
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Estimate {
+    /// str : Which model the matches support.
+    ///
+    /// ``"general"``, ``"planar"`` (there may be a second pose, the runner-up), ``"pure_rotation"`` (no translation that
+    /// stands clear of the noise: ``t`` is the small vector that is left) or ``"degenerate"``.
+    #[pyo3(get)]
+    model: String,
+    pose: RelativePose,
+    covariance: Matrix6<f64>,
+    inliers: Vec<bool>,
+    /// float : How well the pose explains all matches, from 0 to 1.
+    #[pyo3(get)]
+    score: f64,
+    /// int : Samples drawn.
+    #[pyo3(get)]
+    iterations: usize,
+    /// RunnerUp or None : The pose that explains the matches nearly as well, where there is one.
+    #[pyo3(get)]
+    runner_up: Option<RunnerUp>,
+    evidence: [f64; 3],
+    /// float : The standard deviation of the inliers' Sampson errors, in the unit of the threshold.
+    #[pyo3(get)]
+    noise_px: f64,
+}
+
+type State = (String, PoseState, Vec<f64>, Vec<bool>, f64, usize, Option<RunnerUpState>, [f64; 3], f64);
+
+/// The estimate that ``Estimate.__reduce__`` took apart.
+#[pyfunction]
+pub(crate) fn _estimate(state: State) -> Estimate {
+    let (model, pose, covariance, inliers, score, iterations, runner_up, evidence, noise_px) = state;
+    Estimate {
+        model,
+        pose: pose_from(pose),
+        covariance: Matrix6::from_iterator(covariance),
+        inliers,
+        score,
+        iterations,
+        runner_up: runner_up.map(_runner_up),
+        evidence,
+        noise_px,
+    }
+}
+
+impl Estimate {
+    /// An estimate of the core.
+    fn new(found: &robust::Estimate) -> Self {
+        let Evidence { rotation_px, planar_px, general_px } = found.evidence;
+        Self {
+            model: Model::name(found.model).to_owned(),
+            pose: canonical(found.pose),
+            covariance: found.covariance,
+            inliers: found.inliers.clone(),
+            score: found.score,
+            iterations: found.iterations,
+            runner_up: found.runner_up.map(|other| RunnerUp {
+                pose: canonical(other.pose),
+                score: other.score,
+                inlier_count: other.inlier_count,
+            }),
+            evidence: [rotation_px, planar_px, general_px],
+            noise_px: found.noise_px,
+        }
+    }
+
+    fn covariance_rows(&self) -> Vec<[f64; 6]> {
+        // Symmetric: columns are rows.
+        let columns: [[f64; 6]; 6] = self.covariance.into();
+        columns.to_vec()
+    }
+}
+
+#[pymethods]
+impl Estimate {
+    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
+    #[getter]
+    #[pyo3(name = "R")]
+    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::to_numpy(py, rotation_rows(&self.pose))
+    }
+
+    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.t_21.as_slice().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
+    #[getter]
+    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.pose.wxyz().to_pyarray(py)
+    }
+
+    /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
+    #[getter]
+    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let [w, x, y, z] = self.pose.wxyz();
+        [x, y, z, w].to_pyarray(py)
+    }
+
+    /// float : The length of ``t``.
+    #[getter]
+    fn parallax(&self) -> f64 {
+        self.pose.t_21.norm()
+    }
+
+    /// numpy.ndarray of shape (N,) of bool : Which matches are within the threshold and in front of both cameras.
+    #[getter]
+    fn inliers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        self.inliers.to_pyarray(py)
+    }
+
+    /// int : How many matches are inliers.
+    #[getter]
+    fn inlier_count(&self) -> usize {
+        self.inliers.iter().filter(|inlier| **inlier).count()
+    }
+
+    /// numpy.ndarray of shape (6, 6) : The covariance of the rotation vector of the rotation's error and of ``t``.
+    ///
+    /// The true rotation is ``exp([w]x) @ R`` with w in radians, in the frame of camera 2.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::to_numpy(py, self.covariance_rows())
+    }
+
+    /// dict of str to float : The median residual of the inliers under each model, in the unit of the threshold.
+    ///
+    /// ``rotation_px`` under a rotation without translation, ``planar_px`` under a plane (infinite where none was found),
+    /// ``general_px`` under the essential matrix.
+    #[getter]
+    fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, value) in ["rotation_px", "planar_px", "general_px"].into_iter().zip(self.evidence) {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+
+    /// The estimate as plain numbers and lists, ready for ``json.dumps``.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     The keys of the command line's JSON.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("model", &self.model)?;
+        set_pose(&dict, &self.pose)?;
+        let covariance: Vec<_> = self.covariance_rows().into_iter().map(Vec::from).collect();
+        dict.set_item("covariance", covariance)?;
+        dict.set_item("inliers", &self.inliers)?;
+        dict.set_item("inlier_count", self.inlier_count())?;
+        dict.set_item("score", self.score)?;
+        dict.set_item("iterations", self.iterations)?;
+        dict.set_item("runner_up", self.runner_up.as_ref().map(|other| other.to_dict(py)).transpose()?)?;
+        let evidence = PyDict::new(py);
+        for (name, value) in ["rotation_px", "planar_px", "general_px"].into_iter().zip(self.evidence) {
+            evidence.set_item(name, value.is_finite().then_some(value))?;
+        }
+        dict.set_item("evidence", evidence)?;
+        dict.set_item("noise_px", self.noise_px)?;
+        Ok(dict)
+    }
+
+    fn __repr__(&self) -> String {
+        let (q, t) = (self.pose.wxyz(), self.pose.t_21.as_slice());
+        format!(
+            "<Estimate {}: quat_wxyz={q:.6?}, t={t:.6?}, inliers={} of {}, score={:.3}>",
+            self.model,
+            self.inlier_count(),
+            self.inliers.len(),
+            self.score
+        )
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
+        let state = (
+            self.model.clone(),
+            pose_state(&self.pose),
+            self.covariance.iter().copied().collect(),
+            self.inliers.clone(),
+            self.score,
+            self.iterations,
+            self.runner_up.as_ref().map(RunnerUp::state),
+            self.evidence,
+            self.noise_px,
+        );
+        Ok((py.import("quest_pose._core")?.getattr("_estimate")?, (state,)))
+    }
+}
