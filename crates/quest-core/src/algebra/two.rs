@@ -1,4 +1,4 @@
-//! Two numbers side by side, as the registers of every x86-64 and AArch64 processor hold them: loops over matches take two at
+//! Two numbers side by side, as the registers of every x86-64 and `AArch64` processor hold them: loops over matches take two at
 //! a time. Arrays that the compiler could have put there it does not.
 
 use std::array::from_fn;

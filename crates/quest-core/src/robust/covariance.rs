@@ -19,7 +19,7 @@ use crate::solver::motion::Motion;
 const PARAMETERS: f64 = 5.0;
 
 /// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with the loss of Geman and
-/// McClure at three standard deviations.
+/// `McClure` at three standard deviations.
 const EFFICIENCY: f64 = 1.10;
 
 /// Steps of the numerical derivatives of the length, in radians.

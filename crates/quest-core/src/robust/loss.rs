@@ -19,7 +19,7 @@ pub(super) struct Biweight {
     pub(super) inverse_square: f64,
 }
 
-/// `r² / (1 + r²/c²)`: the loss of Geman and McClure.
+/// `r² / (1 + r²/c²)`: the loss of Geman and `McClure`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GemanMcClure {
     /// `1 / c²`.

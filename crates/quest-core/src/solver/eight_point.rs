@@ -32,12 +32,13 @@ use super::aligned::Alignment;
 use super::essential::decompose;
 use super::five_point::unit;
 use super::least_squares::{null_vector, outer};
-use super::motion::{Motion, tangent_basis};
+use super::motion::Motion;
 use super::normalisation::Normalisation;
 use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, PoseSolver};
 use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::degeneracy::diagnose_fewer_than;
+use crate::epipolar_frame::tangent_basis;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// Hartley's normalised eight-point method; its steps stand at the head of the module.

@@ -134,7 +134,7 @@ const RANK_ONE: f64 = 1e-7;
 pub(crate) fn motions(h: &Matrix3<f64>) -> [Option<Motion>; 2] {
     let ([largest, middle, smallest], [v1, v2, v3]) = eigen_3(&h.tr_mul(h));
     // Of rank one, as far as can be told: it takes all points to the same one.
-    if !(middle > RANK_ONE * RANK_ONE * largest) {
+    if middle <= RANK_ONE * RANK_ONE * largest {
         return [None; 2];
     }
     let h = h / middle.sqrt();

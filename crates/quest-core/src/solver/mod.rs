@@ -129,67 +129,20 @@ impl SolverName {
     /// The table's row.
     #[must_use]
     pub fn info(self) -> SolverInfo {
+        fn of<S: PoseSolver>(max_candidates: usize, reference: &'static str) -> SolverInfo {
+            SolverInfo { name: S::NAME, min_matches: S::MIN_MATCHES, max_candidates, reference }
+        }
         match self {
-            Self::Quest => SolverInfo {
-                name: Quest::NAME,
-                min_matches: Quest::MIN_MATCHES,
-                max_candidates: 21,
-                reference: "this project; elimination of Nistér, PAMI 2004",
-            },
-            Self::QuestEigen => SolverInfo {
-                name: QuestEigen::NAME,
-                min_matches: QuestEigen::MIN_MATCHES,
-                max_candidates: 21,
-                reference: "Fathian et al., RAS 2018, section 7.1",
-            },
-            Self::Relinearization => SolverInfo {
-                name: Relinearization::NAME,
-                min_matches: Relinearization::MIN_MATCHES,
-                max_candidates: 21,
-                reference: "Fathian et al., RAS 2018, section 7.2",
-            },
-            Self::Nister => SolverInfo {
-                name: Nister::NAME,
-                min_matches: Nister::MIN_MATCHES,
-                max_candidates: 20,
-                reference: "Nistér, PAMI 2004",
-            },
-            Self::Stewenius => SolverInfo {
-                name: Stewenius::NAME,
-                min_matches: Stewenius::MIN_MATCHES,
-                max_candidates: 20,
-                reference: "Stewénius, Engels, Nistér, ISPRS 2006",
-            },
-            Self::LiHartley => SolverInfo {
-                name: LiHartley::NAME,
-                min_matches: LiHartley::MIN_MATCHES,
-                max_candidates: 20,
-                reference: "Li, Hartley, ICPR 2006",
-            },
-            Self::Kukelova => SolverInfo {
-                name: Kukelova::NAME,
-                min_matches: Kukelova::MIN_MATCHES,
-                max_candidates: 20,
-                reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
-            },
-            Self::Kneip => SolverInfo {
-                name: Kneip::NAME,
-                min_matches: Kneip::MIN_MATCHES,
-                max_candidates: 20,
-                reference: "Kneip, Siegwart, Pollefeys, ECCV 2012",
-            },
-            Self::Homography => SolverInfo {
-                name: Homography::NAME,
-                min_matches: Homography::MIN_MATCHES,
-                max_candidates: 4,
-                reference: "Ma, Soatto, Košecká, Sastry, 2004, section 5.3",
-            },
-            Self::EightPoint => SolverInfo {
-                name: EightPoint::NAME,
-                min_matches: EightPoint::MIN_MATCHES,
-                max_candidates: 2,
-                reference: "Hartley, PAMI 1997",
-            },
+            Self::Quest => of::<Quest>(21, "this project; elimination of Nistér, PAMI 2004"),
+            Self::QuestEigen => of::<QuestEigen>(21, "Fathian et al., RAS 2018, section 7.1"),
+            Self::Relinearization => of::<Relinearization>(21, "Fathian et al., RAS 2018, section 7.2"),
+            Self::Nister => of::<Nister>(20, "Nistér, PAMI 2004"),
+            Self::Stewenius => of::<Stewenius>(20, "Stewénius, Engels, Nistér, ISPRS 2006"),
+            Self::LiHartley => of::<LiHartley>(20, "Li, Hartley, ICPR 2006"),
+            Self::Kukelova => of::<Kukelova>(20, "Kukelova, Bujnak, Pajdla, PAMI 2012"),
+            Self::Kneip => of::<Kneip>(20, "Kneip, Siegwart, Pollefeys, ECCV 2012"),
+            Self::Homography => of::<Homography>(4, "Ma, Soatto, Košecká, Sastry, 2004, section 5.3"),
+            Self::EightPoint => of::<EightPoint>(2, "Hartley, PAMI 1997"),
         }
     }
 
