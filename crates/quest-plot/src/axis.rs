@@ -112,7 +112,11 @@ impl Ruler {
 }
 
 /// Multiples of 1, 2 or 5 times a power of ten.
-#[expect(clippy::cast_possible_truncation, reason = "as many steps as there are ticks")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "as many steps as there are ticks, none where there are fewer"
+)]
 fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let rough = (high - low) / count.max(1) as f64;
     if rough <= 0.0 || !rough.is_finite() {

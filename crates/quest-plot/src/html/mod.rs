@@ -34,7 +34,7 @@ pub(crate) fn page(page: &Page) -> Result<String, PlotError> {
     ))
 }
 
-/// plotly.js without MathJax, which plotly's crate puts behind it.
+/// plotly.js without the typesetting of formulas, which plotly's crate puts behind it.
 fn plotly_js() -> String {
     const END: &str = "</script>";
     let mut scripts = Plot::offline_js_sources();
@@ -72,14 +72,15 @@ fn section(title: &str, caption: &str, content: &str) -> String {
 /// One button a name, in the order of their appearance.
 fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, bool)>) -> String {
     let mut seen = BTreeSet::new();
-    let buttons = entries.filter(|(name, ..)| seen.insert(*name)).map(|(name, colour, is_shown)| {
+    let mut buttons = String::new();
+    for (name, colour, is_shown) in entries.filter(|(name, ..)| seen.insert(*name)) {
         let (name, colour) = (escaped(name), colour.hex());
-        format!(
+        buttons += &format!(
             "<button type=\"button\" aria-pressed=\"{is_shown}\" data-name=\"{name}\">\
              <i style=\"background:{colour}\"></i>{name}</button>\n"
-        )
-    });
-    format!("<div class=\"legend\">\n{}</div>\n", buttons.collect::<String>())
+        );
+    }
+    format!("<div class=\"legend\">\n{buttons}</div>\n")
 }
 
 /// A place for a plot, with its data beside it.
@@ -95,8 +96,8 @@ fn plot(class: &str, title: &str, plot: &Plot) -> Result<String, PlotError> {
 
 fn table_section(caption: &str, rows: &[Vec<String>]) -> String {
     let row = |cells: &Vec<String>, tag: &str| {
-        let cells: String = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escaped(c))).collect();
-        format!("<tr>{cells}</tr>\n")
+        let cells: Vec<String> = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escaped(c))).collect();
+        format!("<tr>{}</tr>\n", cells.concat())
     };
     let header = rows.first().map(|r| row(r, "th")).unwrap_or_default();
     let body: String = rows.iter().skip(1).map(|r| row(r, "td")).collect();
