@@ -6,11 +6,12 @@ use super::essentials::Essentials;
 use super::frame::{Frame, frame};
 use super::geometry::{Vector3, dot, product, scaled};
 use super::instructions::{Instructions, Task, Token};
-use super::lane::{F, Float, Lanes, Mask, WordLanes};
+use super::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
 use super::motion::Motion;
 use super::null_space::{Basis, null_space};
 use super::resultant::Resultant;
-use super::roots::{self, MAX_ROOTS, Tables};
+use super::roots::{self, MAX_ROOTS, Root, Tables};
+use super::twice::{Twice, TwiceLanes, twice};
 use crate::solver::{Kinds, PoseSolver, Quest};
 use crate::{Candidates, Correspondence};
 
@@ -98,15 +99,9 @@ impl BatchSolver {
         out: &mut Essentials,
     ) -> Result<(), SampleError> {
         self.solve(matches, samples, out)?;
-        if (0..out.samples()).all(|sample| out.is_complete(sample)) {
-            return Ok(());
-        }
-        let lanes = std::mem::take(out);
         for (sample, indices) in samples.iter().enumerate() {
-            if lanes.is_complete(sample) {
-                out.push_sample(true, lanes.matrices()[lanes.of(sample)].iter().copied());
-            } else {
-                out.push_sample(true, alone(&indices.map(|i| matches[i as usize])));
+            if !out.is_complete(sample) {
+                out.replace(sample, alone(&indices.map(|i| matches[i as usize])));
             }
         }
         Ok(())
@@ -143,9 +138,6 @@ struct Batch<'a> {
     out: &'a mut Essentials,
 }
 
-/// The most lanes of `f64`.
-pub(super) const MAX_LANES: usize = 8;
-
 /// The bearings of a group of samples: of each match three columns for view 1, of each match three for view 2.
 type Bearings = [[[f64; MAX_LANES]; 15]; 2];
 
@@ -169,10 +161,7 @@ impl Batch<'_> {
                 .map_err(|error| SampleError { sample: error.sample + group * L::COUNT, ..error })?;
             solve_group(lanes, tables, self.tolerance, &bearings, &mut found);
             for lane in 0..samples.len() {
-                let slots = found.slots[..found.most].iter();
-                let kept = slots.filter(|slot| slot.is_kept[lane]);
-                let matrix = |slot: &Slot| slot.matrix.map(|entry| entry[lane]);
-                self.out.push_sample(found.is_complete[lane], kept.map(matrix));
+                self.out.push_sample(found.is_complete[lane], found.of(lane));
             }
         }
         Ok(())
@@ -203,23 +192,32 @@ fn gather<L: Lanes<f64>>(
 
 /// What a group of samples has for solutions.
 struct Found {
-    slots: [Slot; MAX_ROOTS],
-    /// How many of the slots are in use.
+    pairs: [Pair; MAX_ROOTS / 2],
+    /// How many of the pairs are in use.
     most: usize,
     is_complete: [bool; MAX_LANES],
 }
 
-/// At most one solution of each sample.
+/// At most two solutions of each sample: the second of all stand behind the first of all.
 #[derive(Clone, Copy)]
-struct Slot {
-    matrix: [[f64; MAX_LANES]; 9],
-    is_kept: [bool; MAX_LANES],
+struct Pair {
+    matrix: [[f64; 2 * MAX_LANES]; 9],
+    is_kept: [bool; 2 * MAX_LANES],
 }
 
 impl Found {
     fn new() -> Self {
-        let slot = Slot { matrix: [[0.0; MAX_LANES]; 9], is_kept: [false; MAX_LANES] };
-        Self { slots: [slot; MAX_ROOTS], most: 0, is_complete: [false; MAX_LANES] }
+        let pair = Pair { matrix: [[0.0; 2 * MAX_LANES]; 9], is_kept: [false; 2 * MAX_LANES] };
+        Self { pairs: [pair; MAX_ROOTS / 2], most: 0, is_complete: [false; MAX_LANES] }
+    }
+
+    /// The matrices of a sample.
+    #[inline(always)]
+    fn of(&self, lane: usize) -> impl Iterator<Item = [f64; 9]> {
+        let places =
+            self.pairs[..self.most].iter().flat_map(move |pair| [(pair, lane), (pair, MAX_LANES + lane)]);
+        let kept = places.filter(|(pair, place)| pair.is_kept[*place]);
+        kept.map(|(pair, place)| std::array::from_fn(|j| pair.matrix[j][place]))
     }
 }
 
@@ -231,8 +229,12 @@ const SMALL_PIVOT: f64 = 1e-8;
 
 /// The last of Newton's steps, squared. Their convergence is quadratic.
 const SHORT_STEP: f64 = 1e-14;
-const MAX_NEWTON_STEPS: usize = 4;
+const MAX_NEWTON_STEPS: usize = 7;
+/// The last step to a root, with and without Newton's iteration to follow.
+const ROOT_BEFORE_NEWTON: f64 = 1e-8;
+const ROOT: f64 = 1e-6;
 
+/// The stages, from bearings to essential matrices.
 #[inline(always)]
 fn solve_group<L: WordLanes>(
     lanes: L,
@@ -241,7 +243,6 @@ fn solve_group<L: WordLanes>(
     bearings: &Bearings,
     found: &mut Found,
 ) {
-    let (zero, one) = (lanes.splat(0.0), lanes.splat(1.0));
     let a = load(lanes, &bearings[0]);
     let b = load(lanes, &bearings[1]);
     let (frame, mut rows) = frame(lanes, &a, &b);
@@ -252,7 +253,6 @@ fn solve_group<L: WordLanes>(
     let mirrored = roots::mirrored::<L>(&polynomial);
     let cells = roots::isolate(lanes, tables, &polynomial, &mirrored);
     let count = lanes.load(&cells.count.map(|n| n as f64));
-    let essentials = essential_basis(lanes, &frame, &basis);
 
     let mut is_complete = lanes.splat(NO_PARALLAX).less(frame.parallax);
     is_complete = is_complete.and(lanes.splat(DEPENDENT).less(independence));
@@ -260,54 +260,82 @@ fn solve_group<L: WordLanes>(
     let difference = (roots::count(lanes, &polynomial) - count).abs();
     is_complete = is_complete.and(difference.less(lanes.splat(0.5)));
 
-    found.most = cells.count[..L::COUNT].iter().copied().max().unwrap_or(0);
-    let mut k = 0;
-    while k < found.most {
-        const TOGETHER: usize = 2;
-        let slot = [lanes.splat(k as f64), lanes.splat((k + 1) as f64)];
-        let is_there = slot.map(|s| s.less(count));
-        let accuracy = if tolerance == Tolerance::Tight { 1e-8 } else { 1e-6 };
-        let roots =
-            roots::refine::<L, TOGETHER>(lanes, &polynomial, &mirrored, &cells, k, &is_there, accuracy);
-        for i in 0..TOGETHER.min(found.most - k) {
-            let point = resultant.point(roots[i].z, roots[i].w);
-            let mut e = combination::<L>(&essentials, &point);
-            let mut is_good = roots[i].is_certain;
-            if tolerance == Tolerance::Tight {
-                let mut motion = Motion::new(lanes, &e);
-                let short = lanes.splat(SHORT_STEP);
-                let mut last = one.select(is_there[i], zero);
-                for _ in 0..MAX_NEWTON_STEPS {
-                    let (next, length) = motion.step(lanes, &a, &b);
-                    let active = short.less(last);
-                    motion = next.select(active, motion);
-                    last = length.select(active, last);
-                    if !short.less(last).any() {
-                        break;
-                    }
-                }
-                is_good = is_good.and(last.less(short + short));
-                e = motion.essential(lanes);
-            } else {
-                e = scaled::<L, 9>(e, (lanes.splat(2.0) / dot::<L, 9>(&e, &e)).sqrt());
-            }
-            let bad = is_there[i];
-            let flags = one.select(is_good, zero);
-            is_complete = is_complete.and(lanes.splat(0.5).less(flags.select(bad, one)));
-            let keep = one.select(is_good, zero).select(is_there[i], zero);
-            let out = &mut found.slots[k + i];
-            for j in 0..9 {
-                e[j].store(&mut out.matrix[j]);
-            }
-            let mut kept = [0.0; MAX_LANES];
-            keep.store(&mut kept);
-            out.is_kept = kept.map(|x| x > 0.5);
+    let back = Back {
+        lanes: TwiceLanes(lanes),
+        tolerance,
+        a: [twice(&a[0]), twice(&a[1]), twice(&a[2]), twice(&a[3]), twice(&a[4])],
+        b: [twice(&b[0]), twice(&b[1]), twice(&b[2]), twice(&b[3]), twice(&b[4])],
+        resultant: resultant.twice(),
+        essentials: essential_basis(&frame, &basis),
+    };
+    found.most = cells.count[..L::COUNT].iter().copied().max().unwrap_or(0).div_ceil(2);
+    for (k, pair) in found.pairs[..found.most].iter_mut().enumerate() {
+        let slot = Twice(lanes.splat((2 * k) as f64), lanes.splat((2 * k + 1) as f64));
+        let is_there = slot.less(Twice(count, count));
+        let accuracy = if tolerance == Tolerance::Tight { ROOT_BEFORE_NEWTON } else { ROOT };
+        let root = roots::refine(lanes, &polynomial, &mirrored, &cells, 2 * k, is_there, accuracy);
+        let (matrix, is_good) = back.essential(&root, is_there);
+        for j in 0..9 {
+            matrix[j].store(&mut pair.matrix[j]);
         }
-        k += TOGETHER;
+        let (zero, one) = (back.lanes.splat(0.0), back.lanes.splat(1.0));
+        let mut kept = [0.0; 2 * MAX_LANES];
+        one.select(is_good.and(is_there), zero).store(&mut kept);
+        pair.is_kept = kept.map(|x| x > 0.5);
+        let lost = zero.select(is_good, one).select(is_there, zero);
+        is_complete = is_complete.and((lost.0 + lost.1).less(lanes.splat(0.5)));
     }
     let mut complete = [0.0; MAX_LANES];
-    one.select(is_complete, zero).store(&mut complete);
+    lanes.splat(1.0).select(is_complete, lanes.splat(0.0)).store(&mut complete);
     found.is_complete = complete.map(|x| x > 0.5);
+}
+
+/// From roots to essential matrices.
+struct Back<L: Lanes<f64>> {
+    lanes: L,
+    tolerance: Tolerance,
+    a: [Vector3<L>; 5],
+    b: [Vector3<L>; 5],
+    resultant: Resultant<L>,
+    essentials: [[F<L>; 4]; 9],
+}
+
+impl<L: Lanes<f64>> Back<L> {
+    /// The essential matrix of a root, and whether it is as accurate as it has to be.
+    #[inline(always)]
+    fn essential(&self, root: &Root<L>, is_there: M<L>) -> ([F<L>; 9], M<L>) {
+        let e = combination::<L>(&self.essentials, &self.resultant.point(root.z, root.w));
+        match self.tolerance {
+            Tolerance::Loop => {
+                let scale = (self.lanes.splat(2.0) / dot::<L, 9>(&e, &e)).sqrt();
+                (scaled::<L, 9>(e, scale), root.is_certain)
+            }
+            Tolerance::Tight => {
+                let (e, is_good) = self.polished(&e, is_there);
+                (e, is_good.and(root.is_certain))
+            }
+        }
+    }
+
+    /// The solution of the constraints near an essential matrix, and whether Newton's iteration has found it.
+    #[inline(always)]
+    fn polished(&self, e: &[F<L>; 9], is_there: M<L>) -> ([F<L>; 9], M<L>) {
+        let lanes = self.lanes;
+        let short = lanes.splat(SHORT_STEP);
+        let mut motion = Motion::new(lanes, e);
+        let mut last = lanes.splat(1.0).select(is_there, lanes.splat(0.0));
+        for _ in 0..MAX_NEWTON_STEPS {
+            let (next, length) = motion.step(lanes, &self.a, &self.b);
+            // A lane that has arrived stays where it is, whatever its neighbours do.
+            let active = short.less(last);
+            motion = next.select(active, motion);
+            last = length.select(active, last);
+            if !short.less(last).any() {
+                break;
+            }
+        }
+        (motion.essential(lanes), last.less(short + short))
+    }
 }
 
 #[inline(always)]
@@ -323,26 +351,23 @@ fn load<L: Lanes<f64>>(lanes: L, columns: &[[f64; MAX_LANES]; 15]) -> [Vector3<L
 
 /// The essential matrices between the views as given that span the solutions: `([t]× + p S) R0` of each basis vector.
 #[inline(always)]
-fn essential_basis<L: Lanes<f64>>(lanes: L, frame: &Frame<L>, basis: &Basis<L>) -> [[F<L>; 4]; 9] {
-    let mut out = *basis;
-    let r = &frame.r0_21;
-    let columns = [[r[0][0], r[1][0], r[2][0]], [r[0][1], r[1][1], r[2][1]], [r[0][2], r[1][2], r[2][2]]];
+fn essential_basis<L: Lanes<f64>>(frame: &Frame<L>, basis: &Basis<L>) -> [[F<TwiceLanes<L>>; 4]; 9] {
+    let (r, p) = (&frame.r0_21, frame.parallax);
+    let mut out = [twice(&basis[0]); 9];
     for m in 0..4 {
         let [t0, t1, t2, xx, yy, zz, xy, xz, yz] = basis.map(|form| form[m]);
-        let p = frame.parallax;
         let e = [
             [p * xx, p.mul_add(xy, -t2), p.mul_add(xz, t1)],
             [p.mul_add(xy, t2), p * yy, p.mul_add(yz, -t0)],
             [p.mul_add(xz, -t1), p.mul_add(yz, t0), p * zz],
         ];
         for j in 0..3 {
-            let column = product::<L>(&e, &columns[j]);
+            let column = product::<L>(&e, &[r[0][j], r[1][j], r[2][j]]);
             for i in 0..3 {
-                out[3 * i + j][m] = column[i];
+                out[3 * i + j][m] = Twice(column[i], column[i]);
             }
         }
     }
-    let _ = lanes;
     out
 }
 

@@ -4,6 +4,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// The largest number of lanes, of `f32` with AVX-512.
 pub(super) const MAX_LANES: usize = 16;
+/// The largest number of lanes of `f64`.
+pub(super) const MAX_F64_LANES: usize = 8;
 
 /// Instructions for `COUNT` numbers of type `T` at once. A value of this type proves that the processor has them.
 pub trait Lanes<T>: Copy {

@@ -27,6 +27,31 @@
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # The stages of a solve
+//! The formulation is that of [`quest`](crate::solver::quest), the scalar solver, which is also the oracle of the tests:
+//!
+//! | file | what |
+//! |---|---|
+//! | `frame.rs` | the best alignment of the bearings (Wahba's problem), the rows `[n/p, sym(b cᵀ)]` |
+//! | `null_space.rs` | their null space, by Householder reflections |
+//! | `cubics.rs` | ten cubics without the factor `p` |
+//! | `elimination.rs` | reduced to six rows |
+//! | `resultant.rs` | three equations linear in `x` and `y`, the polynomial of degree ten, the point of a root |
+//! | `roots.rs` | all real roots, and a second count of them by Sturm's theorem |
+//! | `motion.rs` | rotation and translation, Newton's iteration |
+//! | `batch.rs` | all of it, for groups of samples |
+//!
+//! What a scalar solver decides by branches is decided here by masks, or not at all: no pivoting, no second attempt. A lane
+//! that needs one is flagged, in less than a hundredth of samples, and left to the scalar solver. No lane looks at another,
+//! so that the result for a sample does not depend on its place, its neighbours or the size of the batch.
+//!
+//! The lanes are those of `lane.rs`: `vector.rs` (AVX2, AVX-512) and `sse2.rs` by pulp, `portable.rs` for other processors;
+//! `twice.rs` takes two roots of every sample at once.
+#![expect(
+    clippy::inline_always,
+    reason = "what is not inlined into a task is compiled without its instructions"
+)]
 
 mod batch;
 mod cubics;
@@ -46,6 +71,7 @@ mod score;
 mod sse2;
 #[cfg(test)]
 mod test;
+mod twice;
 #[cfg(target_arch = "x86_64")]
 mod vector;
 

@@ -3,6 +3,7 @@
 use super::elimination::ROWS;
 use super::geometry::{cross, longest};
 use super::lane::{F, Float, Lanes};
+use super::twice::{TwiceLanes, twice};
 
 /// A polynomial of degree ten, coefficients from the constant up.
 pub(super) type Polynomial<L> = [F<L>; 11];
@@ -27,6 +28,19 @@ impl<L: Lanes<f64>> Resultant<L> {
             out.x[r] = [a[2], a[1] - b[2], a[0] - b[1], -b[0]];
             out.y[r] = [a[5], a[4] - b[5], a[3] - b[4], -b[3]];
             out.w[r] = [a[9], a[8] - b[9], a[7] - b[8], a[6] - b[7], -b[6]];
+        }
+        out
+    }
+
+    /// The same equations for twice the lanes.
+    #[inline(always)]
+    pub(super) fn twice(&self) -> Resultant<TwiceLanes<L>> {
+        let mut out =
+            Resultant { x: [twice(&self.x[0]); 3], y: [twice(&self.y[0]); 3], w: [twice(&self.w[0]); 3] };
+        for r in 1..3 {
+            out.x[r] = twice(&self.x[r]);
+            out.y[r] = twice(&self.y[r]);
+            out.w[r] = twice(&self.w[r]);
         }
         out
     }

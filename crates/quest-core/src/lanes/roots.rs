@@ -16,15 +16,14 @@
 
 use std::sync::LazyLock;
 
-use super::lane::{F, Float, Lanes, M, Mask, WordLanes};
+use super::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
 use super::resultant::Polynomial;
+use super::twice::{Twice, TwiceLanes, twice};
 
 /// How many angles are looked at.
 const ANGLES: usize = 64;
 /// Cells of one of the two charts.
 const CHART: usize = ANGLES / 2;
-/// Of `f64`.
-const MAX_LANES: usize = 8;
 /// The most roots of a polynomial.
 pub(super) const MAX_ROOTS: usize = 10;
 /// How often a cell is divided.
@@ -380,69 +379,50 @@ pub(super) struct Root<L: Lanes<f64>> {
     /// `(z, w)`, the larger of which is one.
     pub(super) z: F<L>,
     pub(super) w: F<L>,
-    /// Whether the last step was short enough.
+    /// Whether the last step was short enough: not where it is no number.
     pub(super) is_certain: M<L>,
 }
 
-/// The roots of cells `slot` to `slot + K`, several at once: the steps of one wait for each other.
+/// The roots of the cells in a slot of every lane and in the next one.
 #[inline(always)]
-pub(super) fn refine<L: Lanes<f64>, const K: usize>(
+pub(super) fn refine<L: Lanes<f64>>(
     lanes: L,
     p: &Polynomial<L>,
     mirrored: &Polynomial<L>,
     cells: &Cells,
     slot: usize,
-    is_there: &[M<L>; K],
+    is_there: M<TwiceLanes<L>>,
     tolerance: f64,
-) -> [Root<L>; K] {
+) -> Root<TwiceLanes<L>> {
+    let both = |columns: &[[f64; MAX_LANES]; MAX_ROOTS]| {
+        Twice(lanes.load(&columns[slot]), lanes.load(&columns[slot + 1]))
+    };
+    let lanes = TwiceLanes(lanes);
     let (zero, one, half) = (lanes.splat(0.0), lanes.splat(1.0), lanes.splat(0.5));
     let tolerance = lanes.splat(tolerance);
-    let never = one.less(zero);
-    let mut low = [zero; K];
-    let (mut high, mut at_low, mut t, mut last) = (low, low, low, low);
-    let mut chart = [never; K];
-    let mut polynomials = [*p; K];
-    for k in 0..K {
-        let slot = slot + k;
-        chart[k] = zero.less(lanes.load(&cells.chart[slot]));
-        polynomials[k] = in_chart::<L>(p, mirrored, chart[k]);
-        low[k] = lanes.load(&cells.low[slot]);
-        high[k] = lanes.load(&cells.high[slot]);
-        at_low[k] = lanes.load(&cells.at_low[slot]);
-        let at_high = lanes.load(&cells.at_high[slot]);
-        t[k] = (high[k] - low[k]).mul_add(at_low[k] / (at_low[k] - at_high), low[k]);
-        last[k] = one.select(is_there[k], zero);
-    }
+    let chart = zero.less(both(&cells.chart));
+    let p = in_chart::<TwiceLanes<L>>(&twice(p), &twice(mirrored), chart);
+    let (mut low, mut high) = (both(&cells.low), both(&cells.high));
+    let (at_low, at_high) = (both(&cells.at_low), both(&cells.at_high));
+    let mut t = (high - low).mul_add(at_low / (at_low - at_high), low);
+    let mut last = one.select(is_there, zero);
     for _ in 0..MAX_STEPS {
-        let mut moving = never;
-        for k in 0..K {
-            let (value, slope) = with_slope::<L>(&polynomials[k], t[k]);
-            let above = zero.less(value * at_low[k]);
-            low[k] = t[k].select(above, low[k]);
-            high[k] = high[k].select(above, t[k]);
-            let newton = t[k] - value / slope;
-            let inside = low[k].less(newton).and(newton.less(high[k]));
-            let next = newton.select(inside, half * (low[k] + high[k]));
-            // A lane that has arrived stays where it is, whatever its neighbours do.
-            let active = tolerance.less(last[k]);
-            last[k] = (next - t[k]).abs().select(active, last[k]);
-            t[k] = next.select(active, t[k]);
-            moving = moving.or(tolerance.less(last[k]));
-        }
-        if !moving.any() {
+        let (value, slope) = with_slope::<TwiceLanes<L>>(&p, t);
+        let above = zero.less(value * at_low);
+        low = t.select(above, low);
+        high = high.select(above, t);
+        let newton = t - value / slope;
+        let inside = low.less(newton).and(newton.less(high));
+        let next = newton.select(inside, half * (low + high));
+        // A lane that has arrived stays where it is, whatever its neighbours do.
+        let active = tolerance.less(last);
+        last = (next - t).abs().select(active, last);
+        t = next.select(active, t);
+        if !tolerance.less(last).any() {
             break;
         }
     }
-    let mut roots = [Root { z: zero, w: zero, is_certain: never }; K];
-    for k in 0..K {
-        roots[k] = Root {
-            z: one.select(chart[k], t[k]),
-            w: (-t[k]).select(chart[k], one),
-            // Also false where it is not a number.
-            is_certain: last[k].less(tolerance + tolerance),
-        };
-    }
-    roots
+    Root { z: one.select(chart, t), w: (-t).select(chart, one), is_certain: last.less(tolerance + tolerance) }
 }
 
 /// The number of real roots by Sturm's theorem: the signs of the leading coefficients of the chain tell how often the sign
