@@ -57,6 +57,7 @@ pub mod candidate;
 pub mod conventions {}
 pub mod correspondence;
 mod degeneracy;
+pub mod disambiguation;
 pub mod feasibility;
 pub mod lanes;
 pub mod pose;
