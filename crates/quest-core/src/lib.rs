@@ -58,6 +58,7 @@ pub mod candidate;
 pub mod conventions {}
 pub mod correspondence;
 mod degeneracy;
+pub mod disambiguation;
 mod epipolar_frame;
 pub mod feasibility;
 pub mod lanes;
