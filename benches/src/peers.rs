@@ -2,7 +2,7 @@
 #![cfg(feature = "peers")]
 
 use kornia_algebra::Vec2F64;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use quest_core::{Correspondence, RelativePose};
 
 /// Five points on the planes `z = 1`, as kornia-3d takes them.
@@ -31,4 +31,25 @@ pub fn essential_error(truth: &RelativePose, found: &[Matrix3<f64>]) -> f64 {
     let truth = truth.essential().normalize();
     let distance = |e: &Matrix3<f64>| (e.normalize() - truth).norm().min((e.normalize() + truth).norm());
     found.iter().map(distance).fold(f64::INFINITY, f64::min)
+}
+
+/// The four poses of an essential matrix, `U (W or Wᵀ) Vᵀ` with the last column of U as `±t`.
+#[must_use]
+pub fn poses(e: &Matrix3<f64>) -> Vec<RelativePose> {
+    let svd = e.svd(true, true);
+    let (Some(mut u), Some(mut v_t)) = (svd.u, svd.v_t) else { return Vec::new() };
+    if u.determinant() < 0.0 {
+        u.neg_mut();
+    }
+    if v_t.determinant() < 0.0 {
+        v_t.neg_mut();
+    }
+    let w = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let rotations = [w, w.transpose()].map(|w| u * w * v_t);
+    let t: nalgebra::Vector3<f64> = u.column(2).into();
+    rotations
+        .into_iter()
+        .map(|r| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(r)))
+        .flat_map(|q_21| [t, -t].map(|t_21| RelativePose::new(q_21, t_21)))
+        .collect()
 }

@@ -10,6 +10,7 @@ pub mod literal_quest;
 pub mod pairs;
 pub mod polynomial;
 pub mod quartics;
+pub mod relinearization;
 pub mod scenes;
 pub mod solution_sets;
 

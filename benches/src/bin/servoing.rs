@@ -316,7 +316,8 @@ fn main() {
     for cell in cells().iter().filter(|cell| cell.name.contains(&arguments.cell)) {
         let run = |index| Ok::<_, Infallible>(cell.run(arguments.seed, index));
         // What is only there to be compared with gets a quarter of the starts.
-        let starts = if cell.method == Method::Filter { arguments.starts } else { arguments.starts.div_ceil(4) };
+        let starts =
+            if cell.method == Method::Filter { arguments.starts } else { arguments.starts.div_ceil(4) };
         let Ok(outcomes) = parallel::map(starts, arguments.threads, run);
         let count = |end| outcomes.iter().filter(|o| o.end == end).count();
         let share = |count: usize| 100.0 * count as f64 / outcomes.len() as f64;

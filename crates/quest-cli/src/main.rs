@@ -3,12 +3,15 @@
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+mod input;
 mod options;
 mod rows;
 mod servo;
+mod simulate;
 mod solve;
 mod solvers;
 mod table;
+mod view;
 mod words;
 
 use std::process::ExitCode;
@@ -20,6 +23,7 @@ Examples:
   quest-cli solve examples/points.json             a table of the candidate poses
   quest-cli solve --format json pair.json | jq     the same for programs
   quest-cli servo --scenario robot --noise 0.5     a robot that drives to where an image was taken
+  quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
   quest-cli solvers                                the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -35,6 +39,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Solve(Box<solve::Arguments>),
+    Simulate(Box<simulate::Arguments>),
+    View(view::Arguments),
     Solvers(solvers::Arguments),
     Servo(Box<servo::Arguments>),
 }
@@ -52,11 +58,20 @@ enum Failure {
     Read(#[from] quest_io::ReadError),
     #[error(transparent)]
     Write(#[from] quest_io::WriteError),
+    #[error(transparent)]
+    Scene(#[from] quest_core::simulate::SceneError),
+    #[error(transparent)]
+    Plot(#[from] quest_plot::PlotError),
+    /// Arguments that do not go together.
+    #[error("{0}")]
+    Arguments(String),
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
         Command::Servo(arguments) => servo::run(&arguments),
     };

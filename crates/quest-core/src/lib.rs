@@ -42,7 +42,7 @@
 //! | 7.1 | rotations as eigenvalues | [`solver::quest_eigen`] |
 //! | 8 | translation and depths | [`structure`] |
 //! | 9 | random scenes, noise, error metrics | [`simulate`] |
-//! | 9.4 | the methods it is compared with | [`solver::nister`], [`solver::stewenius`] |
+//! | 9.4 | the methods it is compared with | [`solver::nister`], [`solver::stewenius`], [`solver::li_hartley`], [`solver::kukelova`] |
 //! | 10, appendix C | visual servoing: control laws, the closed loop | [`servo`] |
 //! | appendix B | which poses are feasible | [`feasibility`] |
 //! | not in it | the default solver, right at every parallax | [`solver::quest`] |

@@ -6,7 +6,7 @@ use quest_core::solver::{Kinds, SolverName};
 use quest_tests::scenes::{exact_rotations, scenes, solve};
 use quest_tests::solution_sets::nearest;
 
-use super::noisy;
+use super::{noisy, same_rotations};
 
 const SEED_AGREEMENT: u64 = 104;
 
@@ -32,4 +32,37 @@ fn quest_and_quest_eigen_find_the_same_solutions() {
     assert_eq!(differ, []);
     // About nine real solutions a problem.
     assert!(solutions > 350_000, "{solutions}");
+}
+
+/// The five-point solvers that return the real solutions, and of how many of 10,000 problems each may find others than the
+/// rest do: those with nearly double solutions, of which rounding makes a complex pair, and for solvers that do not refine
+/// theirs those that it moves by more than [`SAME`](super::SAME). About twice what was found.
+const EXACT: [(SolverName, usize); 5] = [
+    (SolverName::Quest, 2),
+    (SolverName::QuestEigen, 0),
+    (SolverName::Relinearization, 0),
+    (SolverName::Nister, 80),
+    (SolverName::Stewenius, 0),
+];
+
+#[test]
+fn all_exact_solvers_find_the_same_solutions() {
+    let mut different = [[0; EXACT.len()]; EXACT.len()];
+    for options in [SceneOptions::default(), SceneOptions::realistic()] {
+        for scene in scenes(noisy(options), SEED_AGREEMENT + 1, 5_000) {
+            let found =
+                EXACT.map(|(solver, _)| exact_rotations(&solve(solver, Kinds::Exact, &scene.matches)));
+            for i in 0..EXACT.len() {
+                for j in 0..i {
+                    different[i][j] += usize::from(!same_rotations(&found[i], &found[j]));
+                }
+            }
+        }
+    }
+    for i in 0..EXACT.len() {
+        for j in 0..i {
+            let [(a, some), (b, others)] = [EXACT[i], EXACT[j]];
+            assert!(different[i][j] <= some + others, "{a:?} and {b:?}: {different:?}");
+        }
+    }
 }

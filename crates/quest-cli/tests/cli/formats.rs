@@ -85,12 +85,12 @@ fn columns_of_csv_are_found_by_name() {
 
 #[test]
 fn solvers_in_every_format() {
-    let table = run(&["solvers"]);
+    let table = run(&["solvers", "--no-times"]);
     assert_eq!((table.status, table.stderr.as_str()), (0, ""));
     let list: serde_json::Value =
-        serde_json::from_str(&run(&["solvers", "--format", "json"]).stdout).unwrap();
-    let lines = run(&["solvers", "--format", "jsonl"]).stdout;
-    let csv = run(&["solvers", "--format", "csv"]).stdout;
+        serde_json::from_str(&run(&["solvers", "--no-times", "--format", "json"]).stdout).unwrap();
+    let lines = run(&["solvers", "--no-times", "--format", "jsonl"]).stdout;
+    let csv = run(&["solvers", "--no-times", "--format", "csv"]).stdout;
     assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,reference"));
     for (index, solver) in list.as_array().unwrap().iter().enumerate() {
         let name = solver["name"].as_str().unwrap();
@@ -100,6 +100,19 @@ fn solvers_in_every_format() {
             &serde_json::from_str::<serde_json::Value>(lines.lines().nth(index).unwrap()).unwrap(),
             solver
         );
+    }
+}
+
+#[test]
+fn solvers_are_timed() {
+    let csv = run(&["solvers", "--format", "csv"]).stdout;
+    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,time_us,reference"));
+    let list: serde_json::Value =
+        serde_json::from_str(&run(&["solvers", "--format", "json"]).stdout).unwrap();
+    for solver in list.as_array().unwrap() {
+        // Between the fastest solver's own time and a tenth of a second.
+        let time_us = solver["time_us"].as_f64().unwrap();
+        assert!((0.1..1e5).contains(&time_us), "{solver}");
     }
 }
 

@@ -7,6 +7,8 @@ mod formats;
 mod output;
 mod readme;
 mod servo;
+mod simulate;
+mod view;
 
 use std::{
     fs,

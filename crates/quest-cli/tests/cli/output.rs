@@ -13,8 +13,8 @@ fn files(directory: &Path) -> Vec<String> {
 #[test]
 fn a_file_is_written_as_on_standard_output() {
     let directory = tempfile::tempdir().unwrap();
-    let shown = run(&["solvers", "--format", "json"]);
-    let run = run_in(directory.path(), &["solvers", "--format", "json", "-o", "out.txt"], b"");
+    let shown = run(&["solvers", "--no-times", "--format", "json"]);
+    let run = run_in(directory.path(), &["solvers", "--no-times", "--format", "json", "-o", "out.txt"], b"");
     assert_eq!((run.status, run.stdout.as_str(), run.stderr.as_str()), (0, "", ""));
     assert_eq!(fs::read_to_string(directory.path().join("out.txt")).unwrap(), shown.stdout);
     assert_eq!(files(directory.path()), ["out.txt"]);
@@ -26,7 +26,7 @@ fn the_extension_of_the_file_decides_the_format() {
     for (file, start) in
         [("o.json", "[{\n"), ("o.jsonl", "{\"name\""), ("o.csv", "name,"), ("o.txt", "solver ")]
     {
-        assert_eq!(run_in(directory.path(), &["solvers", "-o", file], b"").status, 0);
+        assert_eq!(run_in(directory.path(), &["solvers", "--no-times", "-o", file], b"").status, 0);
         let text = fs::read_to_string(directory.path().join(file)).unwrap();
         assert!(text.starts_with(start), "{file}: {text}");
     }
@@ -47,7 +47,7 @@ fn a_path_that_cannot_be_written() {
     let directory = directory_with("file", "kept");
     for (path, why) in [("no/out.json", "No such file or directory"), (".", "is a directory"), ("file/x", "")]
     {
-        let run = run_in(directory.path(), &["solvers", "-o", path], b"");
+        let run = run_in(directory.path(), &["solvers", "--no-times", "-o", path], b"");
         assert!(
             run.stderr.starts_with(&format!("error: {path}: cannot be written: {why}")),
             "{}",
@@ -73,7 +73,7 @@ mod unix {
         let directory = directory_with("out.json", "kept");
         let path = directory.path().join("out.json");
         fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
-        let run = run_in(directory.path(), &["solvers", "-o", "out.json"], b"");
+        let run = run_in(directory.path(), &["solvers", "--no-times", "-o", "out.json"], b"");
         assert_eq!(run.stderr, "error: out.json: cannot be written: permission denied\n");
         assert_eq!((run.status, fs::read_to_string(path).unwrap().as_str()), (2, "kept"));
     }
@@ -84,7 +84,7 @@ mod unix {
         let (real, link) = (directory.path().join("real.json"), directory.path().join("link.json"));
         fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).unwrap();
         symlink("real.json", &link).unwrap();
-        assert_eq!(run_in(directory.path(), &["solvers", "-o", "link.json"], b"").status, 0);
+        assert_eq!(run_in(directory.path(), &["solvers", "--no-times", "-o", "link.json"], b"").status, 0);
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert!(fs::read_to_string(&real).unwrap().starts_with("[{"));
         assert_eq!(mode(&real), 0o640);
@@ -93,28 +93,32 @@ mod unix {
     #[test]
     fn a_new_file_is_not_private() {
         let directory = tempfile::tempdir().unwrap();
-        assert_eq!(run_in(directory.path(), &["solvers", "-o", "new.json"], b"").status, 0);
+        assert_eq!(run_in(directory.path(), &["solvers", "--no-times", "-o", "new.json"], b"").status, 0);
         fs::write(directory.path().join("plain"), "").unwrap();
         assert_eq!(mode(&directory.path().join("new.json")), mode(&directory.path().join("plain")));
     }
 
     #[test]
     fn standard_output_has_a_name() {
-        let shown = run(&["solvers"]).stdout;
-        assert_eq!(run(&["solvers", "-o", "/dev/stdout"]).stdout, shown);
-        assert_eq!(run(&["solvers", "-o", "-"]).stdout, shown);
+        let shown = run(&["solvers", "--no-times"]).stdout;
+        assert_eq!(run(&["solvers", "--no-times", "-o", "/dev/stdout"]).stdout, shown);
+        assert_eq!(run(&["solvers", "--no-times", "-o", "-"]).stdout, shown);
     }
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk() {
-    let run = run(&["solvers", "-o", "/dev/full"]);
+    let run = run(&["solvers", "--no-times", "-o", "/dev/full"]);
     assert_eq!(run.stderr, "error: /dev/full: cannot be written: No space left on device\n");
     assert_eq!(run.status, 2);
 
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let child = Command::new(env!("CARGO_BIN_EXE_quest-cli")).arg("solvers").stdout(full).output().unwrap();
+    let child = Command::new(env!("CARGO_BIN_EXE_quest-cli"))
+        .args(["solvers", "--no-times"])
+        .stdout(full)
+        .output()
+        .unwrap();
     let stderr = String::from_utf8(child.stderr).unwrap();
     assert_eq!(stderr, "error: standard output: cannot be written: No space left on device\n");
     assert_eq!(child.status.code(), Some(2));

@@ -44,6 +44,52 @@ pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep
     smallest / largest
 }
 
+/// Eliminates the first `columns` columns by row operations with partial pivoting: below the first `columns` rows they
+/// are free of them. Whether no pivot was zero; what stands in the eliminated columns is not valid.
+pub(crate) fn eliminate<const R: usize, const C: usize>(a: &mut [[f64; C]; R], columns: usize) -> bool {
+    for k in 0..columns {
+        let pivot = (k..R).fold(k, |best, i| if a[i][k].abs() > a[best][k].abs() { i } else { best });
+        a.swap(k, pivot);
+        let row = a[k];
+        let inverse = 1.0 / row[k];
+        if !inverse.is_finite() {
+            return false;
+        }
+        for other in &mut a[k + 1..] {
+            let factor = other[k] * inverse;
+            for j in 0..C {
+                other[j] -= factor * row[j];
+            }
+        }
+    }
+    true
+}
+
+/// The determinant of a square matrix by elimination with partial pivoting; `a` is overwritten.
+pub(crate) fn determinant<const N: usize>(a: &mut [[f64; N]; N]) -> f64 {
+    let mut product = 1.0;
+    for k in 0..N {
+        let pivot = (k..N).fold(k, |best, i| if a[i][k].abs() > a[best][k].abs() { i } else { best });
+        if pivot != k {
+            a.swap(k, pivot);
+            product = -product;
+        }
+        let row = a[k];
+        product *= row[k];
+        if product == 0.0 {
+            return 0.0;
+        }
+        let inverse = 1.0 / row[k];
+        for other in &mut a[k + 1..] {
+            let factor = other[k] * inverse;
+            for j in k + 1..N {
+                other[j] -= factor * row[j];
+            }
+        }
+    }
+    product
+}
+
 /// The null vector of a singular square matrix, scaled so that its last entry is one; `None` where the matrix
 /// has no such vector. `a` is overwritten.
 pub(crate) fn null_vector<T: ComplexField<RealField = f64> + Copy, const N: usize>(
@@ -133,6 +179,23 @@ mod tests {
                 assert!((reduced[i][5 + j] - expected[(i, j)]).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn eliminated_columns_are_gone_and_determinants_agree_with_nalgebra() {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let mut a: [[f64; 5]; 5] =
+            std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+        let expected = SMatrix::<f64, 5, 5>::from_fn(|i, j| a[i][j]).determinant();
+        assert!((determinant(&mut a.clone()) - expected).abs() < 1e-13);
+        // A column that the first three span is eliminated with them.
+        for row in &mut a {
+            row[4] = row[0] - 2.0 * row[1] + 0.5 * row[2];
+        }
+        assert!(eliminate(&mut a, 3));
+        assert!(a[3][4].abs() < 1e-14 && a[4][4].abs() < 1e-14 && a[3][3].abs() > 1e-3);
+        assert!(determinant(&mut [[1.0; 3]; 3]).abs() < 1e-15);
+        assert!(!eliminate(&mut [[0.0; 5]; 3], 1));
     }
 
     #[test]

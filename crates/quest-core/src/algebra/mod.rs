@@ -6,7 +6,9 @@
 pub(crate) mod cholesky;
 pub(crate) mod eigenvalues;
 pub(crate) mod elimination;
+
 pub(crate) mod monomials;
 pub(crate) mod null_space;
 pub(crate) mod polynomial;
+pub(crate) mod singular;
 pub(crate) mod symmetric;

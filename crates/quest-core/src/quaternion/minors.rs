@@ -46,18 +46,37 @@ pub(crate) fn minors_without_q(m: &[Matrix4<f64>; 5]) -> [Quartic; 5] {
     std::array::from_fn(|s| determinant(&neighbours[(s + 1) % 5], &neighbours[(s + 3) % 5]))
 }
 
-/// The ten minors `det[q, M_i q, M_j q, M_k q]`, the triples in lexicographic order.
+/// The fifteen minors without `q` of six matrices, by the four that they contain, in lexicographic order.
+pub(crate) fn fifteen_minors_without_q(m: &[Matrix4<f64>; 6]) -> [Quartic; 15] {
+    let mut out = [[0.0; 35]; 15];
+    let mut row = 0;
+    for i in 0..3 {
+        for j in i + 1..4 {
+            let left = wedge(&m[i], &m[j]);
+            for k in j + 1..5 {
+                for l in k + 1..6 {
+                    out[row] = determinant(&left, &wedge(&m[k], &m[l]));
+                    row += 1;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The minors `det[q, M_i q, M_j q, M_k q]` of `N` matrices, the triples in lexicographic order; there are `R`.
 ///
 /// For matrices `M` that are sums over several matches; for single ones
 /// [`ten_quartics`](super::ten_quartics) is five times as fast.
-pub(crate) fn minors_with_q(m: &[Matrix4<f64>; 5]) -> [Quartic; 10] {
+pub(crate) fn minors_with_q<const N: usize, const R: usize>(m: &[Matrix4<f64>; N]) -> [Quartic; R] {
+    const { assert!(R == N * (N - 1) * (N - 2) / 6) }
     let identity = Matrix4::identity();
-    let mut out = [[0.0; 35]; 10];
+    let mut out = [[0.0; 35]; R];
     let mut row = 0;
-    for i in 0..3 {
+    for i in 0..N - 2 {
         let with_q = wedge(&identity, &m[i]);
-        for j in i + 1..4 {
-            for k in j + 1..5 {
+        for j in i + 1..N - 1 {
+            for k in j + 1..N {
                 out[row] = determinant(&with_q, &wedge(&m[j], &m[k]));
                 row += 1;
             }
@@ -95,7 +114,7 @@ mod tests {
             let expected = det(std::array::from_fn(|i| &columns[(s + 1 + i) % 5]));
             assert!((value(minor) - expected).abs() < 1e-13);
         }
-        let first = minors_with_q(&m)[0];
+        let [first, ..]: [Quartic; 10] = minors_with_q(&m);
         let expected = det([&q, &columns[0], &columns[1], &columns[2]]);
         assert!((value(&first) - expected).abs() < 1e-13);
     }
@@ -104,7 +123,8 @@ mod tests {
     fn minors_with_q_are_the_quartics_up_to_sign() {
         let matches = five();
         let m = matches.map(|c| bilinear(&(c.bearing2() * c.bearing1().transpose())));
-        for (minor, quartic) in minors_with_q(&m).iter().zip(ten_quartics(&matches)) {
+        let minors: [Quartic; 10] = minors_with_q(&m);
+        for (minor, quartic) in minors.iter().zip(ten_quartics(&matches)) {
             let largest = (0..35).fold(0, |b, k| if quartic[k].abs() > quartic[b].abs() { k } else { b });
             let sign = (minor[largest] / quartic[largest]).signum();
             assert!((0..35).all(|k| (minor[k] - sign * quartic[k]).abs() < 1e-13));

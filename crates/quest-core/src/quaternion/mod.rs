@@ -21,7 +21,7 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, Vector3, Vector4};
 
 pub(crate) use constraint::ten_quartics;
 pub use constraint::{constraint_matrix, constraint_matrix_5};
-pub(crate) use minors::{minors_with_q, minors_without_q};
+pub(crate) use minors::{fifteen_minors_without_q, minors_with_q, minors_without_q};
 pub use monomials::MONOMIALS;
 
 /// `M` for the 3 × 3 matrix `y = b aᵀ`, or a sum of such: with `q = (q1, q_v)`, `M q = b ⊗ q ⊗ a`.

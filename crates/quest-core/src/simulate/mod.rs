@@ -12,10 +12,12 @@
 //! ```
 
 mod camera;
+mod experiment;
 mod metrics;
 mod options;
 mod sampling;
 mod scene;
+mod selection;
 
 #[cfg(test)]
 mod tests;
@@ -23,6 +25,8 @@ mod tests;
 pub use camera::{
     FOCAL_LENGTH, IMAGE_SIZE, PRINCIPAL_POINT, is_inside_image, pixel_to_plane, plane_to_pixel,
 };
+pub use experiment::{Cell, FURTHER_POINTS, Figure, Problem, Reading};
 pub use metrics::{rotation_metric, translation_metric};
 pub use options::{Angle, Layout, Motion, SceneError, SceneOptions, View};
 pub use scene::Scene;
+pub use selection::{PoseErrors, choose};

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::sampling::{self, Region};
 use super::{Motion, SceneError, SceneOptions, View, is_inside_image, pixel_to_plane, plane_to_pixel};
-use crate::{Correspondence, RelativePose, correspondence};
+use crate::{Correspondence, InputError, RelativePose, correspondence};
 
 /// Images further from the optical axis than this, on the plane `z = 1`, are drawn again.
 const LARGEST_IMAGE_COORDINATE: f64 = 1e3;
@@ -36,14 +36,44 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for options that no scene can meet, or for which none was found.
     pub fn generate(options: &SceneOptions, seed: u64, index: u64) -> Result<Self, SceneError> {
+        Self::with_further(options, 0, seed, index).map(|(scene, _)| scene)
+    }
+
+    /// The same scene, and matches of this many further points of it, seen and disturbed as its own are. Of a point
+    /// behind camera 2, which [`View::Everywhere`] allows, the bearing points backwards, as an all-round camera's does:
+    /// its depth is known to be positive.
+    ///
+    /// They are drawn last: the scene does not depend on their number, and its scale and parallax are those of its
+    /// own points.
+    ///
+    /// # Errors
+    /// Those of [`Scene::generate`].
+    pub fn with_further(
+        options: &SceneOptions,
+        further: usize,
+        seed: u64,
+        index: u64,
+    ) -> Result<(Self, Vec<Correspondence>), SceneError> {
         options.check()?;
         let mut rng = sampling::generator(seed, index);
         for _ in 0..MAX_MOTIONS {
             let draft = Draft::new(&mut rng, options);
-            if let Some((t_21, points1)) = draft.fill(&mut rng, options) {
-                let mut scene = Self::from_points(RelativePose::new(draft.q_21, t_21), points1)?;
-                scene.add_pixel_noise(&mut rng, options)?;
-                return Ok(scene);
+            let Some((t_21, points1)) = draft.fill(&mut rng, options) else { continue };
+            let pose = RelativePose::new(draft.q_21, t_21);
+            let mut scene = Self::from_points(pose, points1)?;
+            if options.noise_px > 0.0 || options.rounded {
+                scene.matches = observe(&mut rng, options, &scene.truth, &scene.points1)?;
+            }
+            if let Some(points1) = draft.further(&mut rng, options, &t_21, further) {
+                let mut matches = observe(&mut rng, options, &pose, &points1)?;
+                for (index, m) in matches.iter_mut().enumerate() {
+                    if (pose.q_21 * points1[index] + t_21).z < 0.0 {
+                        let backwards =
+                            Correspondence::from_bearings((*m.bearing1()).into(), (-m.bearing2()).into());
+                        *m = backwards.map_err(|source| InputError::Match { index, source })?;
+                    }
+                }
+                return Ok((scene, matches));
             }
         }
         Err(SceneError::NotSeen { attempts: MAX_MOTIONS, points: options.points })
@@ -70,24 +100,29 @@ impl Scene {
     pub fn points2(&self) -> impl Iterator<Item = Vector3<f64>> {
         self.points1.iter().map(|x1| self.truth.q_21 * x1 + self.truth.t_21)
     }
+}
 
-    /// Gaussian noise and rounding, in pixels with K of (60).
-    fn add_pixel_noise(&mut self, rng: &mut ChaCha8Rng, options: &SceneOptions) -> Result<(), SceneError> {
+/// The images of points in both cameras, with Gaussian noise and rounding in pixels with K of (60).
+fn observe(
+    rng: &mut ChaCha8Rng,
+    options: &SceneOptions,
+    pose: &RelativePose,
+    points1: &[Vector3<f64>],
+) -> Result<Vec<Correspondence>, SceneError> {
+    let mut disturbed = |x: Vector3<f64>| {
+        let m = image(x);
         if options.noise_px == 0.0 && !options.rounded {
-            return Ok(());
+            return m;
         }
-        let mut disturb = |m: [f64; 2]| {
-            let pixel = plane_to_pixel(m).map(|c| c + options.noise_px * sampling::normal(rng));
-            pixel_to_plane(if options.rounded { pixel.map(f64::round) } else { pixel })
-        };
-        let (mut images1, mut images2) = (Vec::new(), Vec::new());
-        for (x1, x2) in self.points1.iter().zip(self.points2()) {
-            images1.push(disturb(image(*x1)));
-            images2.push(disturb(image(x2)));
-        }
-        self.matches = correspondence::from_image_points(&images1, &images2)?;
-        Ok(())
+        let pixel = plane_to_pixel(m).map(|c| c + options.noise_px * sampling::normal(rng));
+        pixel_to_plane(if options.rounded { pixel.map(f64::round) } else { pixel })
+    };
+    let (mut images1, mut images2) = (Vec::new(), Vec::new());
+    for x1 in points1 {
+        images1.push(disturbed(*x1));
+        images2.push(disturbed(pose.q_21 * x1 + pose.t_21));
     }
+    Ok(correspondence::from_image_points(&images1, &images2)?)
 }
 
 /// A motion and a place for the points, before it is known whether the cameras see them.
@@ -122,9 +157,7 @@ impl Draft {
         let mut points: Vec<_> = (0..options.points).map(|_| self.region.point(rng)).collect();
         for _ in 0..MAX_ROUNDS {
             let t_21 = self.translation(options.motion, &points);
-            let seen = |x1: &Vector3<f64>| {
-                is_seen(*x1, options.view) && is_seen(self.q_21 * x1 + t_21, options.view)
-            };
+            let seen = |x1: &Vector3<f64>| self.sees(options.view, &t_21, x1);
             if points.iter().all(seen) {
                 return Some((t_21, points));
             }
@@ -133,6 +166,24 @@ impl Draft {
             }
         }
         None
+    }
+
+    /// Points to be seen beside the others; `None` where they are too hard to find.
+    fn further(
+        &self,
+        rng: &mut ChaCha8Rng,
+        options: &SceneOptions,
+        t_21: &Vector3<f64>,
+        count: usize,
+    ) -> Option<Vec<Vector3<f64>>> {
+        // Others of this region were seen already: it takes a while, but is hardly ever in vain.
+        let seen = |x1: &Vector3<f64>| self.sees(options.view, t_21, x1);
+        let mut draw = || (0..50 * MAX_DRAWS).map(|_| self.region.point(rng)).find(seen);
+        (0..count).map(|_| draw()).collect()
+    }
+
+    fn sees(&self, view: View, t_21: &Vector3<f64>, x1: &Vector3<f64>) -> bool {
+        is_seen(*x1, view) && is_seen(self.q_21 * x1 + t_21, view)
     }
 
     /// The translation, of length `s = p m(s)` where the parallax p is given; m(s) is the mean depth.

@@ -210,3 +210,20 @@ fn impossible_options_are_refused() {
     assert_eq!(with(|o| o.angle = Angle::Exactly(-1.0)), SceneError::Angle { found: -1.0 });
     assert_eq!(with(|o| o.noise_px = f64::INFINITY), SceneError::Noise { found: f64::INFINITY });
 }
+
+#[test]
+fn further_points_belong_to_the_scene_and_leave_it_as_it_is() {
+    for base in [SceneOptions::default(), SceneOptions::realistic()] {
+        for noise_px in [0.0, 1.0] {
+            let options = SceneOptions { noise_px, ..base };
+            for index in 0..50 {
+                let (scene, further) = Scene::with_further(&options, 20, 7, index).unwrap();
+                assert_eq!(scene, Scene::generate(&options, 7, index).unwrap());
+                assert_eq!(further.len(), 20);
+                if noise_px == 0.0 {
+                    assert!(scene.truth.residual(&further) < 1e-12);
+                }
+            }
+        }
+    }
+}

@@ -58,7 +58,8 @@ impl Alignment {
         }
     }
 
-    fn with_rotation(q0_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> Self {
+    /// The frame of another rotation, which leaves a parallax of its own.
+    pub(crate) fn with_rotation(q0_21: UnitQuaternion<f64>, matches: &[Correspondence]) -> Self {
         let r0_21 = q0_21.to_rotation_matrix();
         let square = |m: &Correspondence| {
             let c = r0_21 * m.bearing1();

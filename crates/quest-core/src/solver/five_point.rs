@@ -4,9 +4,15 @@
 //! 1. Fewer than five matches, an exact pure rotation and dependent constraints are answered with their reason.
 //! 2. The null space of the rows `x2ᵀ E x1 = 0`: `E = x E1 + y E2 + z E3 + w E4`. For more than five matches, the four
 //!    directions that their sum of squares constrains least.
-//! 3. The solver finds points `(x, y, z, w)`, up to scale.
-//! 4. Each gives two rotations and a translation, without refinement; scale, sign, depths, residuals and order as for
-//!    every solver.
+//! 3. The solver finds points `(x, y, z, w)`, up to scale, and each gives two rotations and a translation.
+//! 4. Where these miss one of five matches by more than rounding, Newton's iteration on rotation and translation brings them
+//!    to the solution. The published methods stop before: near a double root half of the digits are gone. A start from which it
+//!    does not converge is no real solution. Where solutions may be missing (a start that led nowhere or to another one's
+//!    solution, roots too close to tell whether they are real), steps 3 and 4 are done again with another basis.
+//! 5. Scale, sign, depths, residuals and order as for every solver.
+//!
+//! For more than five matches nothing is refined: the candidates are essential matrices in the space that fits all matches
+//! best, not the best of all essential matrices.
 
 use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
 
@@ -15,7 +21,7 @@ use super::aligned::{Alignment, DEPENDENT, GRAM_DEPENDENT};
 use super::cubics::combine;
 use super::essential::{decompose, real_part, twisted};
 use super::least_squares::{outer, principal_basis};
-use super::motion::Motion;
+use super::motion::{Motion, Outcome};
 use super::shortlist::{Shortlist, pure_rotation};
 use super::trace_cubics::Basis;
 use crate::algebra::null_space;
@@ -31,7 +37,7 @@ pub(crate) fn solve(
     kinds: Kinds,
     matches: &[Correspondence],
     out: &mut Candidates,
-    method: impl FnOnce(&mut Solutions) -> bool,
+    method: impl Fn(&mut Solutions) -> bool,
 ) {
     out.clear();
     if matches.len() < MIN_MATCHES {
@@ -40,17 +46,32 @@ pub(crate) fn solve(
     if let Some(alignment) = Alignment::of_pure_rotation(matches) {
         return pure_rotation(&alignment, matches, out);
     }
-    match null_space(matches) {
-        Err(degeneracy) => out.set_degeneracy(degeneracy),
-        Ok(basis) => {
-            let mut solutions = Solutions { basis, matches, shortlist: Shortlist::new() };
-            if !method(&mut solutions) {
-                return out.set_degeneracy(Degeneracy::RankDeficient);
-            }
-            solutions.shortlist.write(kinds, matches, out);
+    let basis = match null_space(matches) {
+        Err(degeneracy) => return out.set_degeneracy(degeneracy),
+        Ok(basis) => basis,
+    };
+    let mut solutions =
+        Solutions { basis, kinds, matches, doubtful: false, real: 0, shortlist: Shortlist::new() };
+    let mut solved = method(&mut solutions);
+    for mixing in &MIXINGS {
+        if solved && solutions.is_complete() {
+            break;
         }
+        solutions.mix(mixing);
+        solved |= method(&mut solutions);
     }
+    if !solved {
+        return out.set_degeneracy(Degeneracy::RankDeficient);
+    }
+    solutions.shortlist.write(kinds, matches, out);
 }
+
+/// Orthogonal changes of the null space's basis, for another attempt where the first is in doubt: solutions that have nearly the
+/// same `z` in one basis are apart in another.
+const MIXINGS: [[[f64; 4]; 4]; 2] = [
+    [[0.8, 0.0, 0.6, 0.0], [0.0, 0.28, 0.0, 0.96], [-0.6, 0.0, 0.8, 0.0], [0.0, -0.96, 0.0, 0.28]],
+    [[0.5, 0.5, 0.5, 0.5], [0.5, -0.5, 0.5, -0.5], [0.5, 0.5, -0.5, -0.5], [0.5, -0.5, -0.5, 0.5]],
+];
 
 /// The essential matrices that satisfy the constraints of the matches, in the least-squares sense for more than five;
 /// the last one does so best.
@@ -70,27 +91,80 @@ fn null_space(matches: &[Correspondence]) -> Result<Basis, Degeneracy> {
 pub(crate) struct Solutions<'a> {
     /// The four essential matrices that solutions are combinations of.
     pub(crate) basis: Basis,
+    kinds: Kinds,
     matches: &'a [Correspondence],
+    /// Whether a real solution may have been overlooked.
+    pub(crate) doubtful: bool,
+    /// How many essential matrices are real.
+    real: usize,
     shortlist: Shortlist,
 }
+
+/// A solution that misses a match by more than this (the sine of an angle) is refined: rounding is below.
+const PRECISE: f64 = 1e-13;
+
+/// Imaginary parts up to here are tried as real: several real roots close together can be joined by rounding to a pair that
+/// is as far off the line as they are apart. Newton's iteration decides.
+const NEARLY_REAL: f64 = 1e-2;
 
 impl Solutions<'_> {
     /// Adds the two motions of the essential matrix `x E1 + y E2 + z E3 + w E4`.
     pub(crate) fn push_real(&mut self, point: &[f64; 4]) {
         let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
-        let motion = Motion { q_21: unit(q), direction: Vector3::from(t).normalize() };
-        self.shortlist.push_pair(CandidateKind::Exact, motion);
+        let start = Motion { q_21: unit(q), direction: Vector3::from(t).normalize() };
+        self.real += 1;
+        self.push_solution(start);
     }
 
-    /// Adds the real parts of the two rotations of a complex essential matrix, each with the translation that fits
-    /// it best. One of a conjugate pair is enough.
-    pub(crate) fn push_complex(&mut self, point: &[Complex<f64>; 4]) {
-        let Some((q, t)) = decompose(&rows(&combine(&self.basis, point))) else { return };
+    /// Adds what stands behind a conjugate pair of values of an unknown, given the point of the one with the positive
+    /// imaginary part: the real parts of both rotations, each with the translation that fits it best; or two real solutions
+    /// that rounding has joined, where there is next to no imaginary part.
+    pub(crate) fn push_conjugates(
+        &mut self,
+        value: Complex<f64>,
+        point: impl FnOnce() -> Option<[Complex<f64>; 4]>,
+    ) {
+        let nearly_real = value.im < NEARLY_REAL * (1.0 + value.re.abs());
+        if !nearly_real && self.kinds == Kinds::Exact {
+            return;
+        }
+        let decomposed = point().and_then(|point| decompose(&rows(&combine(&self.basis, &point))));
+        let Some((q, t)) = decomposed else { return };
         for q in [q, twisted(&q, &t)] {
             let q_21 = unit(real_part(q));
-            let direction = translation_direction(&q_21, self.matches);
-            self.shortlist.push(CandidateKind::FromComplex, Motion { q_21, direction });
+            let start = Motion { q_21, direction: translation_direction(&q_21, self.matches) };
+            if !(nearly_real && self.push_solution(start)) {
+                self.shortlist.push(CandidateKind::FromComplex, start);
+            }
         }
+    }
+
+    /// Adds the solution of five matches near a motion, and its twisted partner; of more matches the motion itself. Whether there
+    /// is one, and a new one.
+    fn push_solution(&mut self, mut motion: Motion) -> bool {
+        if let Ok(five) = <&[Correspondence; 5]>::try_from(self.matches)
+            && motion.largest_sine(five) > PRECISE
+        {
+            let aligned = Alignment::with_rotation(motion.q_21, five);
+            if motion.solve_five(&aligned, five) == Outcome::Stalled {
+                return false;
+            }
+        }
+        let before = self.shortlist.count(CandidateKind::Exact);
+        self.shortlist.push_pair(CandidateKind::Exact, motion);
+        self.shortlist.count(CandidateKind::Exact) > before
+    }
+
+    /// Whether each real essential matrix has led to two motions of its own.
+    fn is_complete(&self) -> bool {
+        !self.doubtful && self.shortlist.count(CandidateKind::Exact) >= 2 * self.real
+    }
+
+    /// Another basis of the same space. What is exact stays.
+    fn mix(&mut self, mixing: &[[f64; 4]; 4]) {
+        self.basis = mixing.map(|row| combine(&self.basis, &row));
+        self.shortlist.retain(CandidateKind::Exact);
+        (self.doubtful, self.real) = (false, 0);
     }
 }
 

@@ -6,24 +6,34 @@ mod cubics;
 pub mod eight_point;
 mod essential;
 mod five_point;
+mod hidden_variable;
 pub mod homography;
+pub mod kukelova;
 mod least_squares;
+pub mod li_hartley;
+mod moments;
 mod motion;
 pub mod nister;
 mod normalisation;
 pub mod quest;
 pub mod quest_eigen;
+mod refining;
+pub mod relinearization;
 mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
+mod twenty;
 
 use std::str::FromStr;
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;
+pub use kukelova::Kukelova;
+pub use li_hartley::LiHartley;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+pub use relinearization::Relinearization;
 pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
@@ -58,10 +68,16 @@ pub enum SolverName {
     Quest,
     /// [`QuestEigen`].
     QuestEigen,
+    /// [`Relinearization`].
+    Relinearization,
     /// [`Nister`].
     Nister,
     /// [`Stewenius`].
     Stewenius,
+    /// [`LiHartley`].
+    LiHartley,
+    /// [`Kukelova`].
+    Kukelova,
     /// [`Homography`].
     Homography,
     /// [`EightPoint`].
@@ -91,8 +107,17 @@ pub struct UnknownSolver {
 
 impl SolverName {
     /// Every solver, in the order of the table; the first is the default.
-    pub const ALL: [Self; 6] =
-        [Self::Quest, Self::QuestEigen, Self::Nister, Self::Stewenius, Self::Homography, Self::EightPoint];
+    pub const ALL: [Self; 9] = [
+        Self::Quest,
+        Self::QuestEigen,
+        Self::Relinearization,
+        Self::Nister,
+        Self::Stewenius,
+        Self::LiHartley,
+        Self::Kukelova,
+        Self::Homography,
+        Self::EightPoint,
+    ];
 
     /// The table's row.
     #[must_use]
@@ -110,6 +135,12 @@ impl SolverName {
                 max_candidates: 21,
                 reference: "Fathian et al., RAS 2018, section 7.1",
             },
+            Self::Relinearization => SolverInfo {
+                name: Relinearization::NAME,
+                min_matches: Relinearization::MIN_MATCHES,
+                max_candidates: 21,
+                reference: "Fathian et al., RAS 2018, section 7.2",
+            },
             Self::Nister => SolverInfo {
                 name: Nister::NAME,
                 min_matches: Nister::MIN_MATCHES,
@@ -121,6 +152,18 @@ impl SolverName {
                 min_matches: Stewenius::MIN_MATCHES,
                 max_candidates: 20,
                 reference: "Stewénius, Engels, Nistér, ISPRS 2006",
+            },
+            Self::LiHartley => SolverInfo {
+                name: LiHartley::NAME,
+                min_matches: LiHartley::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Li, Hartley, ICPR 2006",
+            },
+            Self::Kukelova => SolverInfo {
+                name: Kukelova::NAME,
+                min_matches: Kukelova::MIN_MATCHES,
+                max_candidates: 20,
+                reference: "Kukelova, Bujnak, Pajdla, PAMI 2012",
             },
             Self::Homography => SolverInfo {
                 name: Homography::NAME,
@@ -142,8 +185,11 @@ impl SolverName {
         match self {
             Self::Quest => Quest { kinds }.solve(matches, out),
             Self::QuestEigen => QuestEigen { kinds }.solve(matches, out),
+            Self::Relinearization => Relinearization { kinds }.solve(matches, out),
             Self::Nister => Nister.solve(matches, out),
             Self::Stewenius => Stewenius { kinds }.solve(matches, out),
+            Self::LiHartley => LiHartley { kinds }.solve(matches, out),
+            Self::Kukelova => Kukelova { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
         }

@@ -79,6 +79,13 @@ impl Motion {
         }
     }
 
+    /// By how much the motion misses the constraints of five matches: the largest `|t · (b × c)|`.
+    pub(crate) fn largest_sine(&self, matches: &[Correspondence; 5]) -> f64 {
+        let essential = self.essential();
+        let sines = matches.each_ref().map(|m| m.bearing2().dot(&(essential * m.bearing1())).abs());
+        sines.into_iter().fold(0.0, f64::max)
+    }
+
     /// Newton's iteration to the solution of five constraints.
     pub(crate) fn solve_five(&mut self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Outcome {
         let resolution = alignment.direction_resolution();

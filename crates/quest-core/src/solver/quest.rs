@@ -28,8 +28,8 @@ use super::aligned::{Alignment, Coordinates, Gram};
 use super::cubics::{Resultant, combine};
 use super::essential::{decompose, real_part, twisted};
 use super::motion::Motion;
-use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver, consensus};
+use super::shortlist::Shortlist;
+use super::{Kinds, PoseSolver, consensus, refining};
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -43,30 +43,10 @@ pub struct Quest {
 
 impl PoseSolver for Quest {
     const NAME: &'static str = "quest";
-    const MIN_MATCHES: usize = 5;
+    const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        out.clear();
-        if matches.len() < Self::MIN_MATCHES {
-            return out.set_degeneracy(Degeneracy::TooFewMatches);
-        }
-        let alignment = Alignment::new(matches);
-        if alignment.is_pure_rotation() {
-            return pure_rotation(&alignment, matches, out);
-        }
-        let found = match matches.try_into() {
-            Ok(five) => from_five(self.kinds, &alignment, five),
-            Err(_) => from_many(&alignment, matches),
-        };
-        match found {
-            Err(degeneracy) => out.set_degeneracy(degeneracy),
-            Ok(shortlist) => {
-                if self.kinds == Kinds::All {
-                    out.push(rotation_only(&alignment, matches));
-                }
-                shortlist.write(self.kinds, matches, out);
-            }
-        }
+        refining::solve(self.kinds, matches, out, from_five, from_many);
     }
 }
 

@@ -23,20 +23,20 @@
 //! **Degenerate**: fewer than five independent constraints; an exact pure rotation. With little parallax all
 //! solutions run together and the eigenvalues lose their digits.
 
-use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
+use nalgebra::{Complex, ComplexField, UnitQuaternion};
 
 use super::aligned::{Alignment, Gram};
-use super::essential::real_part;
 use super::motion::Motion;
 use super::quest::motions_of_five;
-use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, PoseSolver, consensus};
+use super::shortlist::Shortlist;
+use super::twenty::{TwentySolutions, from_five, pre_rotations};
+use super::{Kinds, PoseSolver, consensus, refining};
 use crate::algebra::monomials::position;
 use crate::algebra::{eigenvalues::eigenvalues, elimination};
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
-use crate::quaternion::{bilinear, minors_with_q, minors_without_q, ten_quartics};
+use crate::quaternion::{bilinear, minors_with_q, minors_without_q};
 use crate::structure::translation_direction;
-use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+use crate::{Candidates, Correspondence, Degeneracy};
 
 /// The eigenvalue method of section 7.1 of the paper; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,53 +45,13 @@ pub struct QuestEigen {
     pub kinds: Kinds,
 }
 
-/// Fixed rotations of view 2, as quaternions without symmetry; the second serves where the first does badly.
-const PRE_ROTATIONS: [[f64; 4]; 3] =
-    [[0.39, 0.57, -0.31, 0.65], [0.61, -0.27, 0.54, -0.51], [-0.23, 0.44, 0.71, 0.50]];
-
 impl PoseSolver for QuestEigen {
     const NAME: &'static str = "quest-eigen";
-    const MIN_MATCHES: usize = 5;
+    const MIN_MATCHES: usize = refining::MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        out.clear();
-        if matches.len() < Self::MIN_MATCHES {
-            return out.set_degeneracy(Degeneracy::TooFewMatches);
-        }
-        let alignment = Alignment::new(matches);
-        if alignment.is_pure_rotation() {
-            return pure_rotation(&alignment, matches, out);
-        }
-        let found = match matches.try_into() {
-            Ok(five) => from_five(&alignment, five),
-            Err(_) => from_many(&alignment, matches),
-        };
-        match found {
-            Err(degeneracy) => out.set_degeneracy(degeneracy),
-            Ok(shortlist) => {
-                if self.kinds == Kinds::All {
-                    out.push(rotation_only(&alignment, matches));
-                }
-                shortlist.write(self.kinds, matches, out);
-            }
-        }
+        refining::solve(self.kinds, matches, out, from_five::<Spectrum>, from_many);
     }
-}
-
-/// The solutions of five matches.
-fn from_five(alignment: &Alignment, matches: &[Correspondence; 5]) -> Result<Shortlist, Degeneracy> {
-    alignment.null_space(matches)?;
-    let mut shortlist = Shortlist::new();
-    for g in PRE_ROTATIONS.map(pre_rotation) {
-        let turned = matches.map(|m| m.with_view2_rotated(&g));
-        let m = turned.map(|m| bilinear(&(m.bearing2() * m.bearing1().transpose())));
-        let Some(spectrum) = Spectrum::new(&ten_quartics(&turned), &minors_without_q(&m)) else { continue };
-        shortlist.retain(CandidateKind::Exact);
-        if spectrum.collect(&g, alignment, matches, &mut shortlist) {
-            break;
-        }
-    }
-    Ok(shortlist)
 }
 
 /// The local minima over more than five matches.
@@ -99,10 +59,10 @@ fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortl
     let gram = Gram::new(alignment, matches);
     let [leading @ .., _, _, _, _] = gram.principal_basis(matches)?;
     let mut starts = Shortlist::new();
-    let g = pre_rotation(PRE_ROTATIONS[0]);
+    let g = pre_rotations()[0];
     let m = leading.map(|row| bilinear(&(g.to_rotation_matrix() * alignment.constraint(&row))));
     if let Some(spectrum) = Spectrum::new(&minors_with_q(&m), &minors_without_q(&m)) {
-        for value in spectrum.values {
+        for &value in spectrum.values() {
             if let Some((kind, q_21)) = spectrum.rotation(value, &g) {
                 starts.push(kind, Motion { q_21, direction: translation_direction(&q_21, matches) });
             }
@@ -111,10 +71,6 @@ fn from_many(alignment: &Alignment, matches: &[Correspondence]) -> Result<Shortl
     let mut refined = starts.refined(&gram, matches);
     consensus::add(&mut refined, matches, motions_of_five);
     Ok(refined)
-}
-
-fn pre_rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 /// The columns of the elimination: first the 15 monomials without `q1`, those without `q2` ahead of the others, then
@@ -190,8 +146,7 @@ struct Spectrum {
     values: [Complex<f64>; 20],
 }
 
-impl Spectrum {
-    /// `None` where the quartics are dependent.
+impl TwentySolutions for Spectrum {
     fn new(with_q: &[Quartic; 10], without_q: &[Quartic; 5]) -> Option<Self> {
         let mut a = [[0.0; 35]; 15];
         for (row, quartic) in a.iter_mut().zip(with_q.iter().chain(without_q)) {
@@ -216,6 +171,14 @@ impl Spectrum {
         Some(Self { action, values })
     }
 
+    fn values(&self) -> &[Complex<f64>; 20] {
+        &self.values
+    }
+
+    fn value_at(q: &UnitQuaternion<f64>) -> f64 {
+        q.i / q.w
+    }
+
     /// The quaternion `(1, q2, q3, q4)` for `q2 = value`: the null vector of the equations for the monomials that
     /// leave the basis, ten equations in the ten monomials of `q3` and `q4`.
     fn quaternion<T: ComplexField<RealField = f64> + Copy>(&self, value: T) -> Option<[T; 4]> {
@@ -231,67 +194,4 @@ impl Spectrum {
         let x = elimination::null_vector(&mut a)?;
         Some([T::one(), value, x[7], x[8]])
     }
-
-    /// The rotation of an eigenvalue, with the pre-rotation undone: of a complex pair the real part, once.
-    fn rotation(
-        &self,
-        value: Complex<f64>,
-        g: &UnitQuaternion<f64>,
-    ) -> Option<(CandidateKind, UnitQuaternion<f64>)> {
-        let (kind, [w, x, y, z]) = if value.im == 0.0 {
-            (CandidateKind::Exact, self.quaternion(value.re)?)
-        } else if value.im > 0.0 {
-            (CandidateKind::FromComplex, real_part(self.quaternion(value)?))
-        } else {
-            return None;
-        };
-        let q = g.inverse() * UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-        q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
-    }
-
-    /// Adds the solution of every eigenvalue. Whether all of the real ones were found.
-    fn collect(
-        &self,
-        g: &UnitQuaternion<f64>,
-        alignment: &Alignment,
-        matches: &[Correspondence; 5],
-        shortlist: &mut Shortlist,
-    ) -> bool {
-        let mut complete = true;
-        let mut values = self.values;
-        for k in 0..values.len() {
-            let value = values[k];
-            if value.im < 0.0 || value.re.is_nan() {
-                continue;
-            }
-            let Some((kind, q_21)) = self.rotation(value, g) else {
-                complete = false;
-                continue;
-            };
-            let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
-            if kind == CandidateKind::FromComplex {
-                shortlist.push(kind, motion);
-                continue;
-            }
-            let Some(solution) = shortlist.push_solution(motion, alignment, matches) else {
-                complete = false;
-                continue;
-            };
-            // The twisted partner has been found with it.
-            let twin = (g * solution.twisted().q_21).coords;
-            if let Some(known) = nearest_real(&values[k + 1..], twin.x / twin.w) {
-                values[k + 1 + known].re = f64::NAN;
-            }
-        }
-        let real = self.values.iter().filter(|value| value.im == 0.0).count();
-        complete && shortlist.count(CandidateKind::Exact) >= real
-    }
-}
-
-/// The real eigenvalue that `ratio` is, as far as eigenvalues are precise.
-fn nearest_real(values: &[Complex<f64>], ratio: f64) -> Option<usize> {
-    let distance = |k: &usize| (values[*k].re - ratio).abs();
-    let real = (0..values.len()).filter(|&k| values[k].im == 0.0 && !values[k].re.is_nan());
-    let nearest = real.min_by(|i, j| distance(i).total_cmp(&distance(j)))?;
-    (distance(&nearest) < 1e-6 * (1.0 + ratio.abs())).then_some(nearest)
 }

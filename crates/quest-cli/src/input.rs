@@ -1,0 +1,80 @@
+//! The pairs that a subcommand reads: options, cameras of the command line, warnings.
+
+use std::{collections::HashSet, path::PathBuf};
+
+use clap::Args;
+use quest_core::Camera;
+use quest_io::{Fault, Pair, Pairs, ReadError};
+
+use crate::{
+    options::{InputFormat, parse_camera},
+    words,
+};
+
+/// Where the matches come from.
+#[derive(Args, Debug)]
+pub(crate) struct InputOptions {
+    /// The matches: .json, .jsonl or .csv; `-` is standard input.
+    file: PathBuf,
+    /// The camera of view 1, and of view 2 where it has none of its own. Takes the place of the file's.
+    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
+    camera1: Option<Camera>,
+    /// The camera of view 2. Takes the place of the file's.
+    #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
+    camera2: Option<Camera>,
+    /// The form of the input [default: after its extension, else after its beginning].
+    #[arg(long, value_enum, hide_default_value = true)]
+    input_format: Option<InputFormat>,
+}
+
+/// The pairs of the input, one after the other, with the cameras of the command line.
+pub(crate) struct Input<'a> {
+    options: &'a InputOptions,
+    pairs: Pairs,
+    quiet: bool,
+    /// Unknown keys that have been named.
+    told: HashSet<String>,
+}
+
+impl InputOptions {
+    pub(crate) fn open(&self, quiet: bool) -> Result<Input<'_>, ReadError> {
+        let pairs = quest_io::read(&self.file, self.input_format.map(Into::into))?;
+        Ok(Input { options: self, pairs, quiet, told: HashSet::new() })
+    }
+
+    /// Cameras of the command line take the place of the file's.
+    fn set_cameras(&self, pair: &mut Pair) -> Result<(), ReadError> {
+        let cameras = match (self.camera1, self.camera2, pair.cameras) {
+            (None, None, cameras) => cameras,
+            (Some(camera1), camera2, _) => Some([camera1, camera2.unwrap_or(camera1)]),
+            (None, Some(camera2), Some([camera1, _])) => Some([camera1, camera2]),
+            (None, Some(_), None) => {
+                return Err(pair.place.clone().error(Fault::FirstCameraMissing));
+            }
+        };
+        pair.cameras = cameras;
+        Ok(())
+    }
+}
+
+impl Input<'_> {
+    /// Whether there may be several pairs.
+    pub(crate) fn is_lines(&self) -> bool {
+        self.pairs.format() == quest_io::Format::JsonLines
+    }
+
+    /// The next pair, its unknown keys named.
+    pub(crate) fn next(&mut self) -> Result<Option<Pair>, ReadError> {
+        let Some(pair) = self.pairs.next() else { return Ok(None) };
+        let mut pair = pair?;
+        pair.unknown_keys.retain(|key| self.told.insert(key.clone()));
+        if !pair.unknown_keys.is_empty() && !self.quiet {
+            words::say(
+                "warning",
+                &format!("{}: ignored unknown keys: {}", pair.place, pair.unknown_keys.join(", ")),
+            );
+        }
+        self.options.set_cameras(&mut pair)?;
+        Ok(Some(pair))
+    }
+}

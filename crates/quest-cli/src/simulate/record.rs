@@ -1,0 +1,58 @@
+//! One number of an experiment, as it stands in files.
+
+use serde::Serialize;
+
+use super::statistics::Statistics;
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Quantity {
+    /// (61), in radians.
+    RotationRad,
+    /// (62), in radians.
+    TranslationRad,
+    /// Of one solve, in milliseconds.
+    TimeMs,
+}
+
+/// A row of the result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Record {
+    /// `figure 4`, `table 1`.
+    pub(crate) experiment: String,
+    /// `paper` or `realistic`.
+    pub(crate) scenes: &'static str,
+    /// What is varied: `noise_px`, `parallax`, `points`.
+    pub(crate) varied: &'static str,
+    /// Its value.
+    pub(crate) value: f64,
+    pub(crate) solver: &'static str,
+    /// `exact`, `all` or `selected`.
+    pub(crate) reading: &'static str,
+    pub(crate) quantity: Quantity,
+    /// Scenes; of times, rounds over all scenes.
+    pub(crate) trials: usize,
+    /// Scenes without a candidate, which the numbers leave out.
+    pub(crate) unanswered: usize,
+    pub(crate) mean: Option<f64>,
+    pub(crate) ci95: Option<f64>,
+    pub(crate) median: Option<f64>,
+    /// Of times, the fastest round: what the machine's other work disturbs least.
+    pub(crate) smallest: Option<f64>,
+    /// What the paper's table says.
+    pub(crate) paper: Option<f64>,
+}
+
+impl Record {
+    /// Fills in the statistics.
+    pub(crate) fn with(self, statistics: Option<Statistics>) -> Self {
+        Self {
+            mean: statistics.map(|s| s.mean),
+            ci95: statistics.and_then(|s| s.ci95),
+            median: statistics.map(|s| s.median),
+            smallest: statistics.map(|s| s.smallest),
+            ..self
+        }
+    }
+}

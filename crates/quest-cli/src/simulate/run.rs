@@ -1,0 +1,150 @@
+//! Runs experiments: trials in parallel, their numbers in order.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use quest_core::{
+    simulate::{Cell, Figure, PoseErrors, Reading, SceneError, SceneOptions},
+    solver::SolverName,
+};
+use rayon::prelude::*;
+
+use super::{Record, record::Quantity, statistics::Statistics, timing};
+use crate::Failure;
+
+/// What is run.
+#[derive(Clone, Debug)]
+pub(crate) struct Run {
+    pub(crate) figures: Vec<Figure>,
+    pub(crate) has_table: bool,
+    /// Scenes of a value; those of the paper if none are given.
+    pub(crate) trials: Option<u32>,
+    /// The solvers asked for; those of the paper's figure, and ours, if none are.
+    pub(crate) solvers: Vec<SolverName>,
+    pub(crate) seed: u64,
+    /// The name of the kind of scenes.
+    pub(crate) scenes: &'static str,
+    pub(crate) base: SceneOptions,
+    pub(crate) threads: usize,
+    pub(crate) is_quiet: bool,
+}
+
+/// The errors of one trial: of each solver, by each reading.
+type Trial = Vec<[Option<PoseErrors>; 3]>;
+
+impl Run {
+    /// The scenes of each value of a figure.
+    pub(crate) fn trials_of(&self, figure: Figure) -> u32 {
+        self.trials.unwrap_or(figure.trials())
+    }
+
+    /// The solvers that a figure compares. Homographies are in those alone that have scenes for them.
+    pub(crate) fn solvers_of(&self, figure: Figure) -> Vec<SolverName> {
+        if !self.solvers.is_empty() {
+            return self.solvers.clone();
+        }
+        let for_planes = matches!(figure, Figure::Five | Figure::Six | Figure::Seven);
+        self.all_solvers().into_iter().filter(|&s| for_planes || s != SolverName::Homography).collect()
+    }
+
+    /// The solvers asked for, or all to which the points are enough.
+    pub(crate) fn all_solvers(&self) -> Vec<SolverName> {
+        if !self.solvers.is_empty() {
+            return self.solvers.clone();
+        }
+        let is_able = |s: &SolverName| s.info().min_matches <= self.base.points;
+        SolverName::ALL.into_iter().filter(is_able).collect()
+    }
+
+    /// All numbers, figure by figure, the table last.
+    pub(crate) fn execute(&self) -> Result<Vec<Record>, Failure> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
+        let pool = pool.map_err(|error| Failure::Arguments(format!("--threads: {error}")))?;
+        let bar = self.progress_bar();
+        let mut records = Vec::new();
+        for &figure in &self.figures {
+            bar.set_message(format!("figure {}", figure.number()));
+            records.extend(pool.install(|| self.figure(figure, &bar))?);
+        }
+        if self.has_table {
+            bar.set_message("table 1");
+            records.extend(timing::table(self)?);
+        }
+        bar.finish_and_clear();
+        Ok(records)
+    }
+
+    /// On standard error where it is a terminal, else nowhere.
+    fn progress_bar(&self) -> ProgressBar {
+        if self.is_quiet {
+            return ProgressBar::hidden();
+        }
+        let cells = |&figure: &Figure| figure.cells(&self.base).len() as u64;
+        let trials: u64 = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
+        let bar = ProgressBar::new(trials);
+        if let Ok(style) = ProgressStyle::with_template("{msg:9} {wide_bar} {pos}/{len} scenes, {eta} left") {
+            bar.set_style(style);
+        }
+        bar
+    }
+
+    fn figure(&self, figure: Figure, bar: &ProgressBar) -> Result<Vec<Record>, SceneError> {
+        let solvers = self.solvers_of(figure);
+        let cells = figure.cells(&self.base);
+        let of_cell = |cell: &Cell| {
+            let trials = self.trials(cell, figure, &solvers, bar)?;
+            Ok(self.records(figure, cell, &solvers, &trials))
+        };
+        // Collected in the order of the cells, whatever thread was faster.
+        let records: Result<Vec<_>, SceneError> = cells.par_iter().map(of_cell).collect();
+        Ok(records?.into_iter().flatten().collect())
+    }
+
+    fn trials(
+        &self,
+        cell: &Cell,
+        figure: Figure,
+        solvers: &[SolverName],
+        bar: &ProgressBar,
+    ) -> Result<Vec<Trial>, SceneError> {
+        let trial = |index: u32| {
+            let problem = cell.problem(self.seed, index)?;
+            bar.inc(1);
+            Ok(solvers.iter().map(|&solver| problem.judge(solver)).collect())
+        };
+        (0..self.trials_of(figure)).into_par_iter().map(trial).collect()
+    }
+
+    fn records(&self, figure: Figure, cell: &Cell, solvers: &[SolverName], trials: &[Trial]) -> Vec<Record> {
+        let mut records = Vec::new();
+        for (s, solver) in solvers.iter().enumerate() {
+            for (r, reading) in Reading::ALL.iter().enumerate() {
+                let answers: Vec<PoseErrors> = trials.iter().filter_map(|trial| trial[s][r]).collect();
+                let record = |quantity, error: fn(&PoseErrors) -> f64| {
+                    let values: Vec<f64> = answers.iter().map(error).collect();
+                    let record = Record {
+                        experiment: format!("figure {}", figure.number()),
+                        scenes: self.scenes,
+                        varied: if figure.varies_parallax() { "parallax" } else { "noise_px" },
+                        value: cell.x,
+                        solver: solver.info().name,
+                        reading: reading.name(),
+                        quantity,
+                        trials: trials.len(),
+                        unanswered: trials.len() - answers.len(),
+                        mean: None,
+                        ci95: None,
+                        median: None,
+                        smallest: None,
+                        paper: None,
+                    };
+                    record.with(Statistics::of(&values))
+                };
+                records.push(record(Quantity::RotationRad, |e| e.rotation));
+                // There is no translation to be found in a rotation.
+                if figure != Figure::Seven {
+                    records.push(record(Quantity::TranslationRad, |e| e.translation));
+                }
+            }
+        }
+        records
+    }
+}

@@ -1,0 +1,101 @@
+//! `quest-cli view`: a page that shows one pair in three dimensions.
+
+mod page;
+mod scene;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use quest_core::{
+    Candidate, Candidates, InputError,
+    solver::{Kinds, SolverName},
+};
+use quest_io::{Output, Pair, SolveRecord};
+
+use crate::{Failure, Outcome, input::InputOptions, options::solver_parser, words};
+
+const EXAMPLES: &str = "\
+Examples:
+  quest-cli view examples/points.json -o view.html
+  quest-cli view examples/tiny_berlin_7in.json --all -o view.html
+
+The page shows both cameras, rays, and points at their depths in the frame of camera 1, each
+candidate to be switched on and off, and the residuals. It is one file of 5 MB that works without
+a network. Files are those of `quest-cli solve`; of JSON Lines the first pair is shown.
+
+Exit status: 0 a page, 1 no pose could be found, 2 bad input or arguments.";
+
+/// A page that shows one pair in 3D: cameras, points and candidates.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    input: InputOptions,
+    /// Write the page to this file, whole or not at all.
+    #[arg(short, long, value_name = "FILE.html")]
+    output: PathBuf,
+    /// The solver; `quest-cli solvers` describes them.
+    #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
+    solver: SolverName,
+    /// Show also the candidates that have points behind a camera.
+    #[arg(long)]
+    all: bool,
+    /// Say nothing on standard error but errors and why there is no pose.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// A pair and its candidates.
+struct Solved<'a> {
+    pair: &'a Pair,
+    matches: Vec<quest_core::Correspondence>,
+    /// Those that are shown, best first.
+    candidates: Vec<Candidate>,
+    record: SolveRecord,
+    /// The mean focal length in pixels; without cameras residuals are angles.
+    focal_length: Option<f64>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let mut input = arguments.input.open(arguments.quiet)?;
+    let mut output = Output::open(Some(&arguments.output))?;
+    let Some(pair) = input.next()? else {
+        return Err(Failure::Arguments("found no pair, expected one".to_owned()));
+    };
+    if input.is_lines() && !arguments.quiet && input.next()?.is_some() {
+        words::say("note", &format!("{}: only this pair is shown", pair.place));
+    }
+    let matches = pair.correspondences()?;
+    let info = arguments.solver.info();
+    if matches.len() < info.min_matches {
+        let error = InputError::TooFewMatches { found: matches.len(), needed: info.min_matches };
+        return Err(pair.refuse(error).into());
+    }
+    let mut found = Candidates::new();
+    arguments.solver.solve(Kinds::All, &matches, &mut found);
+    let most = found.iter().map(|c| c.in_front).max().unwrap_or(0);
+    let is_shown = |c: &&Candidate| arguments.all || c.in_front == matches.len();
+    let candidates: Vec<Candidate> = found.iter().filter(is_shown).copied().collect();
+    if candidates.is_empty() {
+        let why = match found.degeneracy() {
+            Some(degeneracy) if found.is_empty() => degeneracy.to_string(),
+            _ if found.is_empty() => "the solver found no candidate".to_owned(),
+            _ => format!(
+                "no candidate has all {} points in front of both cameras, the best has {most}; --all shows them",
+                matches.len()
+            ),
+        };
+        words::say("no pose", &format!("{}: {why}", pair.place));
+        return Ok(Outcome::NoPose);
+    }
+    let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
+    if !arguments.all {
+        record.drop_unfeasible();
+    }
+    let focal_length = pair.focal_length();
+    let solved = Solved { pair: &pair, matches, candidates, record, focal_length };
+    let html = page::html(&solved)?;
+    output.write(|w| w.write_all(html.as_bytes()))?;
+    output.finish()?;
+    Ok(Outcome::Answer)
+}

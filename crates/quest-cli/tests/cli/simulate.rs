@@ -1,0 +1,109 @@
+//! `quest-cli simulate`: the same numbers on any number of threads, sound records, charts, bad arguments.
+
+use std::{collections::BTreeSet, fs};
+
+use crate::{run, run_in};
+
+/// A few scenes of figure 6: general and coplanar points by turns, parallax from 0.
+const QUICK: [&str; 7] = ["simulate", "--figure", "6", "--trials", "3", "--solvers", "quest,nister"];
+
+/// The rows of a CSV file, as the values of their columns by name.
+fn rows(text: &str) -> Vec<std::collections::BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn numbers_do_not_depend_on_the_number_of_threads() {
+    let on = |threads: &str| {
+        let found = run(&[&QUICK[..], &["--format", "csv", "--threads", threads]].concat());
+        assert_eq!(found.status, 0, "{}", found.stderr);
+        found.stdout
+    };
+    let one = on("1");
+    assert_eq!(one, on("3"));
+    let other = run(&[&QUICK[..], &["--format", "csv", "--seed", "2"]].concat());
+    assert_ne!(one, other.stdout);
+}
+
+#[test]
+fn every_value_solver_and_reading_has_its_numbers() {
+    let rows = rows(&run(&[&QUICK[..], &["--format", "csv"]].concat()).stdout);
+    // 101 values, two solvers, three readings, rotation and translation.
+    assert_eq!(rows.len(), 101 * 2 * 3 * 2);
+    for row in &rows {
+        let number = |key: &str| row[key].parse::<f64>().unwrap();
+        assert!(number("trials") == 3.0 && number("unanswered") <= 3.0);
+        if number("unanswered") < 3.0 {
+            assert!((0.0..1.6).contains(&number("mean")) && number("ci95") >= 0.0, "{row:?}");
+        }
+        if row["quantity"] == "translation_rad" && number("value") == 0.0 {
+            assert!(number("mean") == 0.0);
+        }
+    }
+    // More candidates cannot be further from the truth.
+    for pair in rows.iter().filter(|r| r["reading"] == "exact" && r["unanswered"] == "0") {
+        let all = rows.iter().find(|r| {
+            r["reading"] == "all" && ["value", "solver", "quantity"].iter().all(|key| r[*key] == pair[*key])
+        });
+        let [exact, all] = [pair, all.unwrap()].map(|r| r["mean"].parse::<f64>().unwrap());
+        assert!(all <= exact, "{pair:?}");
+    }
+}
+
+#[test]
+fn every_solver_is_timed_beside_the_paper() {
+    let found = run(&["simulate", "--table", "1", "--trials", "2", "--format", "csv"]);
+    let rows = rows(&found.stdout);
+    let names: BTreeSet<&str> = rows.iter().map(|row| row["solver"].as_str()).collect();
+    assert!(["quest", "quest-eigen", "nister", "stewenius"].iter().all(|name| names.contains(name)));
+    for row in &rows {
+        assert!(row["smallest"].parse::<f64>().unwrap() > 0.0 && row["quantity"] == "time_ms");
+    }
+    let quest = rows.iter().find(|row| row["solver"] == "quest").unwrap();
+    assert_eq!(quest["paper"], "0.8857");
+}
+
+#[test]
+fn results_and_charts_are_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let base = ["simulate", "--figure", "7", "--trials", "2", "--solvers", "quest,homography"];
+    for plot in ["a.svg", "a.html"] {
+        let found = run_in(directory.path(), &[&base[..], &["-o", "a.csv", "--plot", plot]].concat(), b"");
+        assert_eq!((found.status, found.stdout.as_str(), found.stderr.as_str()), (0, "", ""));
+        let text = fs::read_to_string(directory.path().join(plot)).unwrap();
+        assert!(text.contains("Figure 7") && text.contains("homography"));
+        assert!(!plot.ends_with("svg") || !text.contains("NaN"));
+    }
+    assert_eq!(rows(&fs::read_to_string(directory.path().join("a.csv")).unwrap()).len(), 101 * 2 * 3);
+}
+
+#[test]
+fn the_table_shows_confidence_intervals() {
+    let found = run(&QUICK);
+    assert!(found.stdout.starts_with("Figure 6") && found.stdout.contains('±'));
+    assert!(found.stdout.contains("chosen by 30 more points"));
+    // No bar where standard error is no terminal.
+    assert_eq!(found.stderr, "");
+}
+
+#[test]
+fn bad_arguments_are_named() {
+    for (arguments, expected) in [
+        (&["--figure", "3"][..], "4, 5, 6, 7 or 8"),
+        (&["--table", "2"], "2 is not in 1..=1"),
+        (&["--figure", "4", "--trials", "0"], "0 is not in"),
+        (&["--figure", "4", "--plot", "a.png"], ".svg or .html"),
+        (&["--figure", "4", "--solvers", "eight-point"], "eight-point needs 8 points"),
+        (&["--figure", "4", "--solvers", "none"], "none"),
+        (&["--figure", "4", "--trials", "1", "-o", "/no/such/directory/a.csv"], "/no/such/directory/a.csv"),
+        (
+            &["--figure", "4", "--trials", "1", "--plot", "/no/such/directory/a.svg"],
+            "/no/such/directory/a.svg",
+        ),
+    ] {
+        let found = run(&[&["simulate"], arguments].concat());
+        assert_eq!((found.status, found.stdout.as_str()), (2, ""), "{arguments:?}");
+        assert!(found.stderr.contains(expected), "{arguments:?}: {}", found.stderr);
+    }
+}

@@ -1,0 +1,109 @@
+//! `quest-cli view`, and the pages as a browser shows them.
+#![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
+
+use std::{fs, path::Path, process::Command};
+
+use crate::{example, run, run_in};
+
+/// What a browser has to say of a page that is no fault of the page: how WebGL is emulated, and a hint at speed.
+const HARMLESS: [&str; 3] =
+    ["willReadFrequently", "GPU stall due to ReadPixels", "fallback to software WebGL"];
+
+/// Switches every entry of every legend off and on, then says on the page that it got there.
+const PROBE: &str = "<script>\
+    for (const button of document.querySelectorAll('.legend button')) { button.click(); button.click(); }\
+    document.title = document.querySelectorAll('.js-plotly-plot').length + ' plots, '\
+      + document.querySelectorAll('.legend button').length + ' switches, '\
+      + document.querySelectorAll('.gl-container canvas').length + ' canvases';\
+    </script></body>";
+
+fn browser() -> Option<&'static str> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    names
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success()))
+}
+
+/// Opens the page in a browser without a window; returns its title after [`PROBE`] has run, and fails on what the
+/// console says. `None` where there is no browser.
+fn opened(page: &Path) -> Option<String> {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: no Chromium to open {} with", page.display());
+        return None;
+    };
+    let probed = page.with_extension("probed.html");
+    let html = fs::read_to_string(page).unwrap();
+    let end = html.rfind("</body>").unwrap();
+    fs::write(&probed, format!("{}{PROBE}</html>", &html[..end])).unwrap();
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader"])
+        .args(["--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--virtual-time-budget=20000"])
+        .args(["--enable-logging=stderr", "--v=0", "--dump-dom"])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}", probed.display()))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    let console = said.lines().filter(|line| line.contains("CONSOLE"));
+    let faults: Vec<_> = console.filter(|line| !HARMLESS.iter().any(|h| line.contains(h))).collect();
+    assert!(faults.is_empty(), "{faults:#?}");
+    let dom = String::from_utf8_lossy(&output.stdout);
+    let title = dom.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next());
+    Some(title.unwrap_or_default().to_owned())
+}
+
+#[test]
+fn a_pair_is_shown_in_a_browser() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, solver) in [("points.json", "quest"), ("tiny_berlin_7in.json", "stewenius")] {
+        let page = directory.path().join("view.html");
+        let found = run_in(
+            directory.path(),
+            &["view", &example(name), "--all", "--solver", solver, "-o", "view.html"],
+            b"",
+        );
+        assert_eq!((found.status, found.stdout.as_str(), found.stderr.as_str()), (0, "", ""));
+        let html = fs::read_to_string(&page).unwrap();
+        // What is ours begins behind plotly.js.
+        let ours = &html[html.find("<h1>").unwrap()..];
+        assert!(
+            ours.contains("camera 1")
+                && ours.contains("1 exact")
+                && ours.contains("match 0<br>depths".replace('<', "\\u003c").as_str())
+        );
+        let candidates = ours.split("<tbody>").nth(1).unwrap().matches("<tr>").count();
+        assert!(candidates > 1 && !ours.contains("NaN"));
+        if let Some(title) = opened(&page) {
+            // The scene and the residuals; a switch in each for each candidate, one for each other camera.
+            let switches = 2 * candidates + 2;
+            assert_eq!(title, format!("2 plots, {switches} switches, 1 canvases"), "{name}");
+        }
+    }
+}
+
+#[test]
+fn figures_are_shown_in_a_browser() {
+    let directory = tempfile::tempdir().unwrap();
+    let page = directory.path().join("figures.html");
+    let arguments = ["simulate", "--figure", "6", "--trials", "2", "--solvers", "quest,nister", "--quiet"];
+    let found = run_in(directory.path(), &[&arguments[..], &["--plot", "figures.html"]].concat(), b"");
+    assert_eq!(found.status, 0, "{}", found.stderr);
+    if let Some(title) = opened(&page) {
+        assert_eq!(title, "6 plots, 2 switches, 0 canvases");
+    }
+}
+
+#[test]
+fn without_a_pose_there_is_no_page() {
+    let directory = tempfile::tempdir().unwrap();
+    let line = "[[0,0,0,0],[0.1,0,0.1,0],[0.2,0,0.2,0],[0.3,0,0.3,0],[0.4,0,0.5,0]]";
+    fs::write(directory.path().join("line.json"), format!("{{\"matches\": {line}}}")).unwrap();
+    let found = run_in(directory.path(), &["view", "line.json", "-o", "view.html"], b"");
+    assert_eq!(found.status, 1, "{}", found.stderr);
+    assert!(found.stderr.contains("line.json") && !directory.path().join("view.html").exists());
+    let found = run(&["view", "/no/such/file.json", "-o", "view.html"]);
+    assert_eq!(found.status, 2);
+    assert!(found.stderr.contains("/no/such/file.json"));
+    assert_eq!(run(&["view", &example("points.json")]).status, 2, "a page needs a name");
+}

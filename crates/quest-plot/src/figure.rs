@@ -1,0 +1,142 @@
+//! What is drawn: figures, panels, series.
+
+use crate::{Axis, Colour, colour};
+
+/// A grid of panels with a title and a sentence or two below it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Figure {
+    /// The title.
+    pub title: String,
+    /// What the reader should know, in plain text.
+    pub caption: String,
+    /// Rows of panels. Panels of a column have one width.
+    pub rows: Vec<Vec<Panel>>,
+}
+
+impl Figure {
+    /// A figure without panels.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    /// Sets the caption.
+    #[must_use]
+    pub fn caption(self, caption: impl Into<String>) -> Self {
+        Self { caption: caption.into(), ..self }
+    }
+
+    /// Adds a row of panels below the others.
+    #[must_use]
+    pub fn row(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
+        self.rows.push(panels.into_iter().collect());
+        self
+    }
+}
+
+/// One pair of axes with series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// The title; may be empty.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// What is drawn, the first at the bottom.
+    pub series: Vec<Series>,
+    /// Whether a unit of x is as long as one of y: for paths, and for images.
+    pub equal_scales: bool,
+}
+
+impl Panel {
+    /// A panel without series.
+    #[must_use]
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+        Self { title: title.into(), x, y, series: Vec::new(), equal_scales: false }
+    }
+
+    /// Adds a series on top of the others.
+    #[must_use]
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// One scale for both axes.
+    #[must_use]
+    pub fn equal_scales(self) -> Self {
+        Self { equal_scales: true, ..self }
+    }
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// A line through the points. A point that is not finite, or not positive on a logarithmic axis, interrupts it.
+    Line,
+    /// A dashed line: what is aimed at, a reference.
+    Dashed,
+    /// A thick line: the one to look at.
+    Thick,
+    /// Dots.
+    Points,
+    /// Crosses: goals, starts.
+    Crosses,
+}
+
+/// A curve, or a set of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// The name: its entry in the legend, and its label unless another is set.
+    pub name: String,
+    /// The label that is written at the last point; empty for none.
+    pub label: String,
+    /// Its colour.
+    pub colour: Colour,
+    /// How it is drawn.
+    pub style: Style,
+    /// The points, `[x, y]`.
+    pub points: Vec<[f64; 2]>,
+    /// A band around the curve, such as a confidence interval: `[x, low, high]`; empty for none.
+    pub band: Vec<[f64; 3]>,
+}
+
+impl Series {
+    /// A line.
+    #[must_use]
+    pub fn line(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        let name = name.into();
+        Self { label: name.clone(), name, colour: colour::INK, style: Style::Line, points, band: Vec::new() }
+    }
+
+    /// Dots, without a label.
+    #[must_use]
+    pub fn points(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { style: Style::Points, label: String::new(), ..Self::line(name, points) }
+    }
+
+    /// Sets the colour.
+    #[must_use]
+    pub fn coloured(self, colour: Colour) -> Self {
+        Self { colour, ..self }
+    }
+
+    /// Sets how it is drawn.
+    #[must_use]
+    pub fn styled(self, style: Style) -> Self {
+        Self { style, ..self }
+    }
+
+    /// Sets the label; an empty one is none.
+    #[must_use]
+    pub fn labelled(self, label: impl Into<String>) -> Self {
+        Self { label: label.into(), ..self }
+    }
+
+    /// Adds a band `[x, low, high]`.
+    #[must_use]
+    pub fn banded(self, band: Vec<[f64; 3]>) -> Self {
+        Self { band, ..self }
+    }
+}

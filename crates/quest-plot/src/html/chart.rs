@@ -1,0 +1,79 @@
+//! A panel as plotly sees it.
+
+use plotly::common::{DashType, ExponentFormat, Fill, HoverInfo, Line, Marker, MarkerSymbol, Mode};
+use plotly::layout::{Axis as PlotlyAxis, AxisRange, AxisType, HoverMode, Layout, Margin};
+use plotly::{Plot, Scatter};
+
+use crate::colour::{GRID, MUTED};
+use crate::{Axis, Colour, Panel, Scale, Series, Style};
+
+pub(super) fn plot(panel: &Panel) -> Plot {
+    let mut plot = Plot::new();
+    for series in &panel.series {
+        if !series.band.is_empty() {
+            plot.add_trace(band(series));
+        }
+        plot.add_trace(curve(panel, series));
+    }
+    let y = if panel.equal_scales { axis(&panel.y).scale_anchor("x") } else { axis(&panel.y) };
+    let layout = Layout::new()
+        .show_legend(false)
+        .hover_mode(HoverMode::Closest)
+        .margin(Margin::new().left(64).right(12).top(8).bottom(48))
+        .x_axis(axis(&panel.x))
+        .y_axis(y);
+    plot.set_layout(layout);
+    plot
+}
+
+fn axis(axis: &Axis) -> PlotlyAxis {
+    let drawn = PlotlyAxis::new()
+        .title(axis.label.as_str())
+        .type_(if axis.scale == Scale::Log { AxisType::Log } else { AxisType::Linear })
+        .grid_color(GRID.hex())
+        .zero_line_color(GRID.hex())
+        .line_color(MUTED.hex())
+        .exponent_format(ExponentFormat::Power)
+        .auto_margin(true);
+    match axis.range {
+        // plotly wants the exponents of a logarithmic axis.
+        Some([from, to]) if axis.scale == Scale::Log => drawn.range(AxisRange::new(from.log10(), to.log10())),
+        Some([from, to]) => drawn.range(AxisRange::new(from, to)),
+        None => drawn,
+    }
+}
+
+/// The band as one closed outline; it belongs to the curve's entry in the legend.
+fn band(series: &Series) -> Box<Scatter<f64, f64>> {
+    let forth = series.band.iter().map(|b| (b[0], b[1]));
+    let back = series.band.iter().rev().map(|b| (b[0], b[2]));
+    let (x, y) = forth.chain(back).unzip();
+    Scatter::new(x, y)
+        .name(series.name.as_str())
+        .mode(Mode::Lines)
+        .line(Line::new().width(0.0))
+        .fill(Fill::ToSelf)
+        .fill_color(translucent(series.colour))
+        .hover_info(HoverInfo::Skip)
+}
+
+fn curve(panel: &Panel, series: &Series) -> Box<Scatter<f64, f64>> {
+    let (x, y) = series.points.iter().map(|p| (p[0], p[1])).unzip();
+    let colour = series.colour.hex();
+    let drawn = Scatter::new(x, y)
+        .name(series.name.as_str())
+        .hover_template(format!("{}: %{{x:.4~g}}<br>{}: %{{y:.4~g}}", panel.x.label, panel.y.label));
+    let line = Line::new().color(colour.clone());
+    let marker = Marker::new().color(colour);
+    match series.style {
+        Style::Line => drawn.mode(Mode::Lines).line(line.width(1.6)),
+        Style::Thick => drawn.mode(Mode::Lines).line(line.width(3.0)),
+        Style::Dashed => drawn.mode(Mode::Lines).line(line.width(1.6).dash(DashType::Dash)),
+        Style::Points => drawn.mode(Mode::Markers).marker(marker.size(6)),
+        Style::Crosses => drawn.mode(Mode::Markers).marker(marker.size(9).symbol(MarkerSymbol::X)),
+    }
+}
+
+fn translucent(Colour(red, green, blue): Colour) -> String {
+    format!("rgba({red},{green},{blue},0.12)")
+}

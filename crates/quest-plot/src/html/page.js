@@ -1,0 +1,27 @@
+"use strict";
+for (const section of document.querySelectorAll("section")) {
+  const plots = [...section.querySelectorAll(".plot")];
+  const buttons = [...section.querySelectorAll(".legend button")];
+  for (const plot of plots) {
+    const { data, layout } = JSON.parse(plot.nextElementSibling.textContent);
+    Plotly.newPlot(plot, data, layout, { responsive: true, displaylogo: false });
+  }
+  const show = (button, isShown) => {
+    button.setAttribute("aria-pressed", isShown);
+    for (const plot of plots) {
+      const traces = plot.data.flatMap((trace, k) => (trace.name === button.dataset.name ? [k] : []));
+      if (traces.length > 0) Plotly.restyle(plot, { visible: isShown ? true : "legendonly" }, traces);
+    }
+  };
+  const isShown = (button) => button.getAttribute("aria-pressed") === "true";
+  for (const button of buttons) {
+    button.title = "click: switch on or off; double click: this one alone, or all";
+    button.addEventListener("click", () => show(button, !isShown(button)));
+    button.addEventListener("dblclick", () => {
+      const others = buttons.filter((other) => other !== button);
+      const isAlone = !others.some(isShown);
+      for (const other of others) show(other, isAlone);
+      show(button, true);
+    });
+  }
+}
