@@ -31,3 +31,31 @@ fn no_solver_allocates() {
         }
     }
 }
+
+/// One image of the closed loop: candidates, fit, choice, filter, law, guards.
+#[test]
+fn no_step_of_the_closed_loop_allocates() {
+    use quest_core::servo::{DepthFilter, FreeCameraLaw, Limits, Safety, Servo, scenario};
+    let limits = Limits { speed: 0.5, turn_rate: 0.6 };
+    let (world, mut camera) = scenario::paper();
+    let rng = &mut scenario::generator(SEED, 0);
+    let goal = world.on_plane(&world.goal_pixels(rng));
+    let filter = DepthFilter::new(&goal, SolverName::Quest, world.filter_options(&limits, 2.0));
+    let law = FreeCameraLaw { rate: 0.25, unit: 2.0 };
+    let mut servo = Servo::new(&goal, filter, law, Safety::new(limits));
+    let mut images = Vec::new();
+    let mut seen = Servo::new(&goal, servo.estimator().clone(), law, Safety::new(limits));
+    world.run(&mut camera, &mut seen, 100, rng, |record| {
+        images.push(record.features.clone());
+        true
+    });
+    // Lost, one false, and found again.
+    images[50].fill(None);
+    images[60][2] = Some([0.9, 0.9]);
+    for (index, image) in images.iter().enumerate() {
+        let info = allocation_counter::measure(|| {
+            std::hint::black_box(servo.step(image));
+        });
+        assert_eq!(info.count_total, 0, "image {index}");
+    }
+}

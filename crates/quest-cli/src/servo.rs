@@ -1,18 +1,24 @@
 //! `quest-cli servo`: a camera or a robot that moves to where the goal image was taken.
 
+mod charts;
 mod frame;
 mod summary;
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
+use quest_core::Camera;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
     Choice, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw,
     HoldReason, Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo, World,
 };
 use quest_core::solver::SolverName;
+use quest_io::Output;
 use rand_chacha::ChaCha8Rng;
 
 use crate::options::{Format, OutputOptions, solver_parser};
+use crate::simulate::{Plot, parse_plot};
 use crate::{Failure, Outcome, rows};
 use frame::FrameRecord;
 use summary::Summary;
@@ -60,6 +66,9 @@ pub(crate) struct Arguments {
     /// The length of the translation; others than goal-depths choose by --rule in each image.
     #[arg(long, value_enum, default_value_t = Translation::GoalDepths)]
     translation: Translation,
+    /// Draw the run (figures 9, 10 and 12 to 19 of the paper); for the robot with the paths from five more starts.
+    #[arg(long, value_name = "FILE.svg|html", value_parser = parse_plot)]
+    plot: Option<Plot>,
     #[command(flatten)]
     output: OutputOptions,
 }
@@ -119,22 +128,49 @@ struct Setup {
 struct Run {
     summary: Summary,
     frames: Vec<FrameRecord>,
+    camera: Camera,
+    /// The features of the goal image, in pixels.
+    goal: Vec<[f64; 2]>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut output = arguments.output.open()?;
-    let run = simulate(arguments);
+    let plot = match &arguments.plot {
+        Some(plot) => Some((plot, Output::open(Some(Path::new(&plot.path)))?)),
+        None => None,
+    };
+    let run = simulate(arguments, 0);
     output.write(|writer| match arguments.output.format(Format::Table) {
         Format::Table => summary::write(writer, &run.summary),
         Format::Json => quest_io::write_json(writer, &run.summary),
         Format::Jsonl => run.frames.iter().try_for_each(|frame| rows::write_line(writer, frame)),
         Format::Csv => frame::write_csv(writer, &run.frames),
     })?;
+    if let Some((plot, mut file)) = plot {
+        let starts = if arguments.scenario == Scenario::Robot { 1..6 } else { 1..1 };
+        let others: Vec<_> = starts.map(|index| simulate(arguments, index)).collect();
+        let text = charts::drawn(&arguments.title(), &run, &others, plot.is_svg)?;
+        file.write(|w| w.write_all(text.as_bytes()))?;
+        file.finish()?;
+    }
     output.finish()?;
     Ok(if run.summary.reached { Outcome::Answer } else { Outcome::NoPose })
 }
 
-fn simulate(arguments: &Arguments) -> Run {
+impl Arguments {
+    fn title(&self) -> String {
+        let moves = match self.scenario {
+            Scenario::Paper => "Section 10.1",
+            Scenario::Random => "A free camera",
+            Scenario::Robot if self.coplanar => "Section 10.4: a robot, coplanar features",
+            Scenario::Robot => "Section 10.3: a robot, general features",
+        };
+        format!("{moves}, {} px of noise, seed {}", self.noise, self.seed)
+    }
+}
+
+/// Run number `index`: the robot's first start is the paper's, the others are random.
+fn simulate(arguments: &Arguments, index: u64) -> Run {
     let features = if arguments.coplanar { Features::Coplanar } else { Features::General };
     let count = usize::from(arguments.features);
     let disturbances = Disturbances {
@@ -143,7 +179,7 @@ fn simulate(arguments: &Arguments) -> Run {
         delay: usize::from(arguments.delay),
         ..Disturbances::default()
     };
-    let mut rng = scenario::generator(arguments.seed, 0);
+    let mut rng = scenario::generator(arguments.seed, index);
     let limits = Limits { speed: 0.5, turn_rate: 0.6 };
     let setup = |mut world: World, images, plane, rng| {
         world.goal_images = usize::from(arguments.goal_images);
@@ -161,8 +197,8 @@ fn simulate(arguments: &Arguments) -> Run {
             drive(arguments, setup(world, 600, None, rng), plant, FreeCameraLaw { rate: 0.3, unit: 2.0 })
         }
         Scenario::Robot => {
-            let (mut world, plant) = scenario::random(features, count, &disturbances, &mut rng, |_| {
-                scenario::robot_start(features)
+            let (mut world, plant) = scenario::random(features, count, &disturbances, &mut rng, |rng| {
+                if index == 0 { scenario::robot_start(features) } else { scenario::random_robot(rng) }
             });
             world.period = 1.0 / 30.0;
             let plane = Some(Plane { tilt: 0.002, height: 0.001 });
@@ -173,7 +209,8 @@ fn simulate(arguments: &Arguments) -> Run {
 
 /// Chooses the estimator.
 fn drive<P: Plant, L: ControlLaw>(arguments: &Arguments, mut setup: Setup, plant: P, law: L) -> Run {
-    let goal = setup.world.on_plane(&setup.world.goal_pixels(&mut setup.rng));
+    let pixels = setup.world.goal_pixels(&mut setup.rng);
+    let goal = setup.world.on_plane(&pixels);
     let choice = match arguments.rule {
         Rule::ClosestDepths => Some(Choice::ClosestDepths),
         Rule::Reprojection => Some(Choice::Reprojection),
@@ -189,13 +226,29 @@ fn drive<P: Plant, L: ControlLaw>(arguments: &Arguments, mut setup: Setup, plant
     if choice.is_none() && length == Length::GoalDepths {
         let options =
             FilterOptions { plane: setup.plane, ..setup.world.filter_options(&setup.limits, setup.unit) };
+        // Exact images need no averaging.
+        let first_images = if arguments.noise > 0.0 { options.first_images } else { 1 };
+        let options = FilterOptions { first_images, ..options };
         let filter = DepthFilter::new(&goal, arguments.solver, options);
-        return watch(arguments, setup, plant, &goal, filter, law);
+        let servo = controller(&setup, &goal, filter, law);
+        return watch(arguments, setup, plant, (pixels, &goal), servo);
     }
     let choice = choice.unwrap_or(Choice::Reprojection);
     let mut estimator = PerFrame::new(&goal, arguments.solver, choice, length);
     estimator.set_depths(&depths);
-    watch(arguments, setup, plant, &goal, estimator, law)
+    let servo = controller(&setup, &goal, estimator, law);
+    watch(arguments, setup, plant, (pixels, &goal), servo)
+}
+
+fn controller<E: PoseEstimator, L: ControlLaw>(
+    setup: &Setup,
+    goal: &[[f64; 2]],
+    estimator: E,
+    law: L,
+) -> Servo<E, L> {
+    let mut safety = Safety::new(setup.limits);
+    safety.border = setup.plane.and_then(|_| setup.world.border(40.0));
+    Servo::new(goal, estimator, law, safety)
 }
 
 /// Runs the loop and records it.
@@ -203,33 +256,27 @@ fn watch<P: Plant, L: ControlLaw, E: PoseEstimator>(
     arguments: &Arguments,
     mut setup: Setup,
     mut plant: P,
-    goal: &[[f64; 2]],
-    estimator: E,
-    law: L,
+    (pixels, goal): (Vec<[f64; 2]>, &[[f64; 2]]),
+    mut servo: Servo<E, L>,
 ) -> Run {
     let depths: Vec<f64> = setup.world.points.iter().map(|x| x.z).collect();
     // What the essential matrix says of the same images, by Stewénius' method as in the paper's figures.
-    let mut essential = PerFrame::new(goal, SolverName::Stewenius, Choice::Reprojection, Length::Unit);
-    essential.set_depths(&depths);
-    let mut homography = arguments.coplanar.then(|| {
-        let mut homography =
-            PerFrame::new(goal, SolverName::Homography, Choice::Reprojection, Length::GoalDepths);
-        homography.set_depths(&depths);
-        homography
-    });
-    let mut safety = Safety::new(setup.limits);
-    safety.border = setup.plane.and_then(|_| setup.world.border(15.0));
-    let mut servo = Servo::new(goal, estimator, law, safety);
+    let compared = |solver, length| {
+        let mut estimator = PerFrame::new(goal, solver, Choice::Reprojection, length);
+        estimator.set_depths(&depths);
+        estimator
+    };
+    let mut essential = compared(SolverName::Stewenius, Length::Unit);
+    let mut homography = arguments.coplanar.then(|| compared(SolverName::Homography, Length::GoalDepths));
     let mut frames = Vec::with_capacity(setup.images);
     let mut summary = Summary::new(arguments.solver.info().name, &depths, &plant.pose());
     setup.world.run(&mut plant, &mut servo, setup.images, &mut setup.rng, |record| {
-        let essential = essential.estimate(&record.features);
-        let homography =
-            homography.as_mut().map_or(Err(HoldReason::Degenerate), |h| h.estimate(&record.features));
+        let essential = essential.estimate(&record.features).ok();
+        let homography = homography.as_mut().and_then(|h| h.estimate(&record.features).ok());
         summary.add(record);
-        frames.push(FrameRecord::new(record, essential.as_ref().ok(), homography.as_ref().ok()));
+        frames.push(FrameRecord::new(record, essential.as_ref(), homography.as_ref()));
         true
     });
     summary.finish(&plant.pose());
-    Run { summary, frames }
+    Run { summary, frames, camera: setup.world.camera, goal: pixels }
 }

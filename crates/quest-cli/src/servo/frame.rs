@@ -23,26 +23,26 @@ impl From<&RelativePose> for Pose {
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct FrameRecord {
     /// In seconds.
-    time: f64,
+    pub(super) time: f64,
     /// `tracking`, or why the robot holds.
     state: &'static str,
     /// The true pose, in metres.
     truth: Pose,
     /// The position of the camera in the goal's frame, in metres.
-    position: [f64; 3],
+    pub(super) position: [f64; 3],
     /// The pose that the command is based on, in the unit of the goal's depths.
-    estimate: Option<Pose>,
+    pub(super) estimate: Option<Pose>,
     inliers: usize,
     alternatives: usize,
     /// In m/s and rad/s, in the camera's frame.
-    linear: [f64; 3],
-    angular: [f64; 3],
+    pub(super) linear: [f64; 3],
+    pub(super) angular: [f64; 3],
     /// The pose of the essential matrix, of unit length.
-    essential: Option<Pose>,
+    pub(super) essential: Option<Pose>,
     /// The pose of the homography, for features on a plane.
-    homography: Option<Pose>,
+    pub(super) homography: Option<Pose>,
     /// The features in the image.
-    pixels: Vec<Option<[f64; 2]>>,
+    pub(super) pixels: Vec<Option<[f64; 2]>>,
 }
 
 impl FrameRecord {

@@ -92,9 +92,9 @@ enum Scenes {
 
 /// Where figures are drawn.
 #[derive(Clone, Debug)]
-struct Plot {
-    path: PathBuf,
-    is_svg: bool,
+pub(crate) struct Plot {
+    pub(crate) path: PathBuf,
+    pub(crate) is_svg: bool,
 }
 
 fn parse_figure(text: &str) -> Result<Figure, String> {
@@ -102,7 +102,7 @@ fn parse_figure(text: &str) -> Result<Figure, String> {
     found.ok_or_else(|| "expected 4, 5, 6, 7 or 8".to_owned())
 }
 
-fn parse_plot(text: &str) -> Result<Plot, String> {
+pub(crate) fn parse_plot(text: &str) -> Result<Plot, String> {
     let path = PathBuf::from(text);
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
