@@ -275,16 +275,16 @@ impl Moments {
             let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
             let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
             let signs = two::dot(&ahead1, &a) * two::dot(&ahead2, &b);
-            opposite = opposite | signs.simd_lt(Two::ZERO);
+            opposite |= signs.simd_lt(Two::ZERO);
             for i in 0..3 {
                 for j in 0..3 {
-                    outer[i][j] = outer[i][j] + b[i] * a[j];
+                    outer[i][j] += b[i] * a[j];
                 }
             }
             let [bb, aa] = [b, a].map(|x| PRODUCTS.map(|(i, j)| x[i] * x[j]));
             for i in 0..6 {
                 for j in 0..6 {
-                    products[i][j] = products[i][j] + bb[i] * aa[j];
+                    products[i][j] += bb[i] * aa[j];
                 }
             }
         }
