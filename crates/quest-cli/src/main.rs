@@ -47,7 +47,7 @@ enum Command {
     Estimate(Box<estimate::Arguments>),
     Simulate(Box<simulate::Arguments>),
     Servo(Box<servo::Arguments>),
-    View(view::Arguments),
+    View(Box<view::Arguments>),
     Solvers(solvers::Arguments),
 }
 

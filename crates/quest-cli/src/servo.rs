@@ -11,7 +11,7 @@ use quest_core::Camera;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
     Choice, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw,
-    HoldReason, Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo, World,
+    Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo, World,
 };
 use quest_core::solver::SolverName;
 use quest_io::Output;

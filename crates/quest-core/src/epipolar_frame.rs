@@ -39,13 +39,13 @@ impl EpipolarFrame {
 
     /// Two bearings `b` of view 2.
     #[inline]
-    pub(crate) fn view2(&self, bearings: &TwoVectors) -> TwoVectors {
+    pub(crate) fn of_view2(&self, bearings: &TwoVectors) -> TwoVectors {
         times(&self.from_2, bearings)
     }
 
     /// The bearings `c` of two of view 1, after the rotation.
     #[inline]
-    pub(crate) fn view1(&self, bearings: &TwoVectors) -> TwoVectors {
+    pub(crate) fn of_view1(&self, bearings: &TwoVectors) -> TwoVectors {
         times(&self.from_1, bearings)
     }
 

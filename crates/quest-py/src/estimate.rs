@@ -65,6 +65,7 @@ use crate::solve::{Views, solver_named};
     seed=0, solver=None, scores=None, initial_pose=None, known_direction=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+#[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
 pub(crate) fn estimate(
     py: Python<'_>,
     x1: &Bound<'_, PyAny>,

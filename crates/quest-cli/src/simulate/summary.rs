@@ -31,7 +31,7 @@ fn of_figure(run: &Run, figure: Figure, records: &[Record]) -> String {
             let chosen: Vec<&Record> = records.iter().filter(of_both).copied().collect();
             if !chosen.is_empty() {
                 let heading = format!("mean {word} error in rad, {}", curves::reading_title(reading));
-                text += &format!("\n{heading}\n{}\n", errors(run, figure, &chosen));
+                text.extend(["\n", &heading, "\n", &errors(run, figure, &chosen), "\n"]);
             }
         }
     }

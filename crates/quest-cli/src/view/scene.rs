@@ -20,11 +20,11 @@ pub(super) fn space(solved: &Solved) -> Space {
     let camera1 = camera(CAMERA_1, colour::INK, &RelativePose::identity(), corners(solved, 0), true);
     let mut space = Space::of_camera("Cameras and points").with(camera1);
     space.axes = ["x1, mean depths", "y1", "z1"].map(str::to_owned);
-    space.caption =
+    space.caption.push_str(
         "In the frame of camera 1, x to the right, y down, z forward; the unit is the mean depth. Drag to turn, \
          scroll to zoom, point at a point for its depths. A point stands where its ray of camera 1 comes closest to \
-         that of camera 2."
-            .to_owned();
+         that of camera 2.",
+    );
     for (index, candidate) in solved.candidates.iter().enumerate() {
         let (name, colour) = (page::name(index, candidate), colour::nth(index));
         let pose = &candidate.pose;

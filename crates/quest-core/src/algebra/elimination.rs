@@ -94,9 +94,7 @@ pub(crate) fn determinant<const N: usize>(a: &mut [[f64; N]; N]) -> f64 {
 /// elimination.
 #[inline]
 fn swap_rows<const R: usize, const C: usize>(a: &mut [[f64; C]; R], i: usize, j: usize) {
-    if let Some((other, rest)) = a[i..=j].split_last_mut()
-        && let Some(row) = rest.first_mut()
-    {
+    if let Some((other, [row, ..])) = a[i..=j].split_last_mut() {
         row.swap_with_slice(other);
     }
 }

@@ -40,7 +40,7 @@ impl<L: Lanes<f64>> Reflections<L> {
         // Two sums: additions wait for each other.
         let (mut even, mut odd) = (v[K] * x[K], v[K + 1] * x[K + 1]);
         for i in K + 2..10 {
-            let sum = if (i - K) % 2 == 0 { &mut even } else { &mut odd };
+            let sum = if (i - K).is_multiple_of(2) { &mut even } else { &mut odd };
             *sum = v[i].mul_add(x[i], *sum);
         }
         let dot = (even + odd) * self.factor[K];

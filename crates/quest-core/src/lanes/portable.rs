@@ -106,6 +106,7 @@ macro_rules! lanes {
         }
     };
     (@binary $real:ty, $($Op:ident $op:ident $symbol:tt),*) => {$(
+        #[expect(clippy::assign_op_pattern, reason = "the symbol comes from outside")]
         impl<const N: usize> $Op for Array<$real, N> {
             type Output = Self;
 

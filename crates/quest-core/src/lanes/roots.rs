@@ -138,6 +138,7 @@ struct Grid {
 
 #[inline(always)]
 fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
+    const HALF: usize = ANGLES / 2;
     let zero = lanes.splat(0.0);
     let (mut c, mut s) = ([zero; 6], [zero; 5]);
     for i in 0..6 {
@@ -166,7 +167,6 @@ fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
         negative_before: none,
     };
     let (mut at, mut behind, mut before) = (lanes.no_bits(), lanes.no_bits(), lanes.no_bits());
-    const HALF: usize = ANGLES / 2;
     for (i, h) in tables.harmonics.iter().enumerate() {
         let h = h.map(|x| lanes.splat(x));
         let values = at_four_angles::<L>(&c, &s, &h);

@@ -199,8 +199,8 @@ impl Motion {
         let (mut cost, mut sums) = (0.0, [[Two::ZERO; 6]; 5]);
         for pair in matches.chunks(2) {
             let second = pair.get(1);
-            let b = frame.view2(&side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2)));
-            let c = frame.view1(&side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1)));
+            let b = frame.of_view2(&side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2)));
+            let c = frame.of_view1(&side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1)));
             let (e, along) = constraint(&b, &c);
             // r = e / √g with g = 2 − (t·b)² − (t·c)² − 2 e², so that
             // dr = ((1 + 2 e²/g) de + (e/g) (t·b d(t·b) + t·c d(t·c))) / √g.
@@ -315,7 +315,7 @@ mod tests {
             motion.direction.dot(&m.bearing2().cross(&c))
         };
         let (b, c) = (side_by_side(m.bearing2(), None), side_by_side(m.bearing1(), None));
-        let (at, gradient) = constraint(&frame.view2(&b), &frame.view1(&c));
+        let (at, gradient) = constraint(&frame.of_view2(&b), &frame.of_view1(&c));
         let (at, gradient) = (at.to_array()[0], gradient.map(|g| g.to_array()[0]));
         assert!((at - residual(&motion)).abs() < 1e-15);
         let h = 1e-6;

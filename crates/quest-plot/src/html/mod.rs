@@ -4,6 +4,7 @@ mod chart;
 mod space;
 
 use std::collections::BTreeSet;
+use std::fmt::Write;
 
 use plotly::Plot;
 
@@ -75,9 +76,10 @@ fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, bool)>) -> String 
     let mut buttons = String::new();
     for (name, colour, is_shown) in entries.filter(|(name, ..)| seen.insert(*name)) {
         let (name, colour) = (escaped(name), colour.hex());
-        buttons += &format!(
+        let _ = writeln!(
+            buttons,
             "<button type=\"button\" aria-pressed=\"{is_shown}\" data-name=\"{name}\">\
-             <i style=\"background:{colour}\"></i>{name}</button>\n"
+             <i style=\"background:{colour}\"></i>{name}</button>"
         );
     }
     format!("<div class=\"legend\">\n{buttons}</div>\n")

@@ -161,7 +161,7 @@ impl<T: Real, const N: usize> Columns<T, N> {
 
     fn push(&mut self, row: impl Iterator<Item = T>) {
         for (column, x) in self.columns.iter_mut().zip(row) {
-            if self.len % BLOCK == 0 {
+            if self.len.is_multiple_of(BLOCK) {
                 column.push([T::NAN; BLOCK]);
             }
             column[self.len / BLOCK][self.len % BLOCK] = x;
