@@ -41,7 +41,7 @@ def test_a_free_camera_arrives() -> None:
         assert np.linalg.norm(command.linear) <= 0.3
         assert np.linalg.norm(command.angular) <= 0.4
         # X2 = R X1 + t changes by R' = -[w] R, t' = -w x t - v.
-        turn = rotation(-0.1 * command.angular)
+        turn = rotation(-0.1 * command.angular) if command.angular.any() else np.eye(3)
         R, t = turn @ R, turn @ t - 0.1 * command.linear
     assert np.linalg.norm(t) < 1e-3
     assert np.arccos(min(1.0, (np.trace(R) - 1) / 2)) < 1e-3
