@@ -18,7 +18,7 @@ use crate::Correspondence;
 use crate::solver::motion::Motion;
 
 /// False matches that are looked at.
-const FALSE_MATCHES: usize = 300;
+const FALSE_MATCHES: usize = 1_000;
 
 /// False matches are counted up to this multiple of the threshold: there are more of them.
 const WIDE: f64 = 3.0;
@@ -27,7 +27,7 @@ const WIDE: f64 = 3.0;
 const SOLUTIONS: f64 = 4.0;
 
 /// The logarithm (base ten) of the number of false alarms that is accepted.
-const ACCEPTED: f64 = -0.5;
+const ACCEPTED: f64 = -1.0;
 
 /// Whether chance does not explain the inliers that `poses` holds, those of `motion`, found among so many samples.
 pub(super) fn is_significant(poses: &PoseScorer, motion: &Motion, iterations: usize) -> bool {

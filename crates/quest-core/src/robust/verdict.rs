@@ -4,6 +4,7 @@
 use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
+use super::DIAGNOSED;
 use super::covariance;
 use super::estimate::{Estimate, Model, RunnerUp};
 use super::length::{Length, length};
@@ -19,9 +20,10 @@ use super::score::MANY;
 use super::search::Search;
 use super::significance::is_significant;
 use super::transfer::square_error;
-use crate::RelativePose;
+use crate::degeneracy::diagnose;
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
+use crate::{Degeneracy, InputError, RelativePose};
 
 /// Poses closer than this in rotation and in the direction of translation (radians) are the same answer.
 const SAME: f64 = 0.02;
@@ -61,7 +63,16 @@ pub(super) fn conclude(
         return Err(EstimateError::NoPose { inliers, matches: observations.len() });
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
-    Ok(assemble(poses, &polished, &others, &of_few, &verdict, iterations))
+    let estimate = assemble(poses, &polished, &others, &of_few, &verdict, iterations);
+    // Points on a line, or repeated ones, have no pose; other families of poses have a member that may be of use.
+    if estimate.model == Model::Degenerate {
+        let count = observations.len().min(DIAGNOSED);
+        match diagnose(&observations.matches[..count]) {
+            Degeneracy::RankDeficient => {}
+            reason => return Err(InputError::Degenerate(reason).into()),
+        }
+    }
+    Ok(estimate)
 }
 
 /// One of the motions of a plane: as its homography has it, and refined as any other motion.
