@@ -441,9 +441,9 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
         for _ in 0..200 {
             let mut a = [[0.0; 20]; 20];
-            for (i, row) in a.iter_mut().enumerate() {
-                for (j, x) in row.iter_mut().enumerate() {
-                    *x = rng.random_range(-1.0..1.0) * 10.0_f64.powi(i as i32 % 3 - j as i32 % 4);
+            for (row, down) in a.iter_mut().zip([1.0, 1e1, 1e2].into_iter().cycle()) {
+                for (x, along) in row.iter_mut().zip([1.0, 1e-1, 1e-2, 1e-3].into_iter().cycle()) {
+                    *x = rng.random_range(-1.0..1.0) * down * along;
                 }
             }
             let form = Hessenberg::new(a).unwrap();

@@ -254,7 +254,7 @@ mod tests {
             let pencil = Pencil::new(&with_q, &without_q).unwrap();
             for &value in pencil.values() {
                 let q = pencil.quaternion(value).unwrap();
-                let norm = q.iter().map(nalgebra::Complex::norm_sqr).sum::<f64>().sqrt();
+                let norm = q.iter().map(Complex::norm_sqr).sum::<f64>().sqrt();
                 let q = q.map(|x| x / norm);
                 let monomial = |e: [u8; 4]| (0..4).map(|k| q[k].powu(e[k].into())).product::<Complex<f64>>();
                 let form = |coefficients: &[f64], list: &[[u8; 4]]| -> Complex<f64> {
