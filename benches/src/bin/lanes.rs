@@ -39,14 +39,14 @@ struct Arguments {
 }
 
 /// Matches of the scene that samples are drawn from.
-const MATCHES: usize = 512;
+const MATCHES: u32 = 512;
 /// Samples of a round, and of a call.
 const SAMPLES: usize = 4096;
 const BATCH: usize = 128;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
-    let options = SceneOptions { noise_px: 0.75, points: MATCHES, ..SceneOptions::realistic() };
+    let options = SceneOptions { noise_px: 0.75, points: MATCHES as usize, ..SceneOptions::realistic() };
     let scene = Scene::generate(&options, arguments.seed, 0)?;
     let samples = draw(arguments.seed, arguments.callgrind.unwrap_or(SAMPLES));
     if arguments.callgrind.is_some() {
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn draw(seed: u64, count: usize) -> Vec<[u32; 5]> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut sample = || loop {
-        let s: [u32; 5] = std::array::from_fn(|_| rng.random_range(0..MATCHES as u32));
+        let s: [u32; 5] = std::array::from_fn(|_| rng.random_range(0..MATCHES));
         if (0..5).all(|i| !s[..i].contains(&s[i])) {
             return s;
         }
@@ -156,13 +156,13 @@ fn nanoseconds<T: Real>(
     e: &[f64; 9],
     loss: Loss,
 ) -> f64 {
-    const CALLS: usize = 64;
+    const CALLS: u32 = 64;
     let seconds = fastest(10 * arguments.rounds, || {
         for _ in 0..CALLS {
             black_box(scorer.score(matches, black_box(e), 2e-3, loss, Stop::Never));
         }
     });
-    seconds * 1e9 / (CALLS * MATCHES) as f64
+    seconds * 1e9 / (f64::from(CALLS) * f64::from(MATCHES))
 }
 
 /// What became of a batch of scenes.
@@ -204,7 +204,7 @@ fn judge(arguments: &Arguments, kind: &SceneKind, batch: u64) -> Result<Failures
     let scenes = scenes?;
     let matches: Vec<_> = scenes.iter().flat_map(|scene| scene.matches.iter().copied()).collect();
     let samples: Vec<[u32; 5]> =
-        (0..scenes.len() as u32).map(|k| [0, 1, 2, 3, 4].map(|i| 5 * k + i)).collect();
+        (0..).step_by(5).take(scenes.len()).map(|first| [0, 1, 2, 3, 4].map(|i| first + i)).collect();
     let solver = BatchSolver::new(Tolerance::Tight);
     let (mut found, mut candidates) = (Essentials::new(), Candidates::new());
     let mut out = Failures::default();

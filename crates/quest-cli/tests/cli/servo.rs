@@ -32,9 +32,16 @@ fn every_image_is_a_row() {
     let text = fs::read_to_string(directory.path().join("run.csv")).unwrap();
     let times = column(&text, "time");
     assert_eq!((times.len(), times[0].as_str()), (1_800, "0.0"));
-    for name in ["true_qw", "x", "qw", "tz", "vz", "wy", "essential_tx", "homography_tx", "u20", "v20"] {
-        let values = column(&text, name);
-        assert!(values.iter().all(|v| v.parse::<f64>().is_ok_and(f64::is_finite)), "{name}");
+    let is_number = |text: &String| text.parse::<f64>().is_ok_and(f64::is_finite);
+    for name in ["true_qw", "x", "vz", "wy", "essential_tx", "homography_tx", "u20", "v20"] {
+        assert!(column(&text, name).iter().all(is_number), "{name}");
+    }
+    // The first images are averaged before there is a pose.
+    let is_tracking: Vec<bool> = column(&text, "state").iter().map(|state| state == "tracking").collect();
+    assert_eq!(is_tracking.iter().position(|&t| t), Some(9));
+    for name in ["qw", "tz"] {
+        let has_pose: Vec<bool> = column(&text, name).iter().map(is_number).collect();
+        assert_eq!(has_pose, is_tracking, "{name}");
     }
     let turn = column(&text, "wy");
     assert!(turn.iter().all(|w| w.parse::<f64>().unwrap().abs() <= 0.6));

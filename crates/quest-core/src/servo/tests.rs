@@ -12,7 +12,7 @@ const LIMITS: Limits = Limits { speed: 0.5, turn_rate: 0.6 };
 const PLANE: Plane = Plane { tilt: 0.002, height: 0.001 };
 
 fn filter(world: &World, goal: &[[f64; 2]], plane: Option<Plane>) -> DepthFilter<SolverName> {
-    let options = FilterOptions { plane, ..world.filter_options(&LIMITS, 2.0) };
+    let options = FilterOptions { plane, first_images: 1, ..world.filter_options(&LIMITS, 2.0) };
     DepthFilter::new(goal, SolverName::Quest, options)
 }
 
