@@ -19,7 +19,7 @@ pub(super) struct Biweight {
     pub(super) inverse_square: f64,
 }
 
-/// `r² / (1 + r²/c²)`: the loss of Geman and McClure.
+/// `r² / (1 + r²/c²)`: the loss of Geman and `McClure`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GemanMcClure {
     /// `1 / c²`.
@@ -46,6 +46,7 @@ impl GemanMcClure {
 
 impl Loss for Truncated {
     #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         if square < self.square_limit { (square, 1.0) } else { (self.square_limit, 0.0) }
     }
@@ -53,6 +54,7 @@ impl Loss for Truncated {
 
 impl Loss for Biweight {
     #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let rest = (1.0 - square * self.inverse_square).max(0.0);
         (1.0 - rest * rest * rest, 3.0 * self.inverse_square * rest * rest)
@@ -61,6 +63,7 @@ impl Loss for Biweight {
 
 impl Loss for GemanMcClure {
     #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
         (square * share, share * share)

@@ -200,7 +200,7 @@ pub(super) fn refine(
     let mut current = subset.equations(observations, motion, loss);
     for _ in 0..max_steps {
         let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else {
-            damping = 10.0 * damping;
+            damping *= 10.0;
             if damping > 1e4 {
                 break;
             }
