@@ -1,22 +1,18 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
-//! To first order the refinement's result is off by `A⁻¹ Σ ψ(r) J` with `A = Σ ψ'(r) J Jᵀ`; so its covariance is `A⁻¹ B A⁻¹`,
-//! `B = Σ ψ(r)² J Jᵀ` (the sandwich of P. J. Huber, *The behavior of maximum likelihood estimates under nonstandard conditions*, 1967).
+//! It is `1.10 σ² H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factor the price of the last
+//! refinement's loss. False matches among the inliers are not accounted for.
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, SVector, UnitQuaternion, Vector5};
 
 use super::length::{Length, length};
-use super::loss::{GemanMcClure, Truncated};
+use super::loss::Truncated;
 use super::observations::Observations;
-use super::polish::SCALE;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::Motion;
-
-/// Parameters of a motion.
-const PARAMETERS: f64 = 5.0;
 
 /// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with the loss of Geman and
 /// `McClure` at three standard deviations.
@@ -35,7 +31,6 @@ fn of_motion(
     inliers: &[u32],
     sigma: f64,
 ) -> Option<Matrix5<f64>> {
-    let _ = (PARAMETERS, GemanMcClure::new(SCALE * sigma));
     let subset = Subset::new(observations, inliers);
     let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));
     let inverse = equations.hessian.cholesky()?.inverse();

@@ -45,14 +45,16 @@ impl GemanMcClure {
 }
 
 impl Loss for Truncated {
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         if square < self.square_limit { (square, 1.0) } else { (self.square_limit, 0.0) }
     }
 }
 
 impl Loss for Biweight {
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let rest = (1.0 - square * self.inverse_square).max(0.0);
         (1.0 - rest * rest * rest, 3.0 * self.inverse_square * rest * rest)
@@ -60,7 +62,8 @@ impl Loss for Biweight {
 }
 
 impl Loss for GemanMcClure {
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
         (square * share, share * share)
