@@ -122,17 +122,20 @@ fn answer(
 /// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.
 fn no_pose(observations: &Observations, threshold: f64, inliers: usize) -> EstimateError {
     let some = &observations.matches[..observations.len().min(DIAGNOSED)];
-    match diagnose(some) {
-        Degeneracy::RankDeficient if observations.is_line(some, threshold) => {
-            degenerate(Degeneracy::Collinear)
-        }
-        Degeneracy::RankDeficient => EstimateError::NoPose { inliers, matches: observations.len() },
-        reason => degenerate(reason),
-    }
+    let otherwise = if observations.is_line(some, threshold) {
+        InputError::Degenerate(Degeneracy::Collinear).into()
+    } else {
+        EstimateError::NoPose { inliers, matches: observations.len() }
+    };
+    degenerate(observations, otherwise)
 }
 
-fn degenerate(reason: Degeneracy) -> EstimateError {
-    InputError::Degenerate(reason).into()
+/// What is exactly wrong with the matches, or something else.
+fn degenerate(observations: &Observations, otherwise: EstimateError) -> EstimateError {
+    match diagnose(&observations.matches[..observations.len().min(DIAGNOSED)]) {
+        Degeneracy::RankDeficient => otherwise,
+        reason => InputError::Degenerate(reason).into(),
+    }
 }
 
 /// Steps 1 and 2: the best pose that samples lead to.

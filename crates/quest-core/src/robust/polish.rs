@@ -9,6 +9,9 @@ use crate::solver::motion::Motion;
 /// Steps of each refinement.
 const STEPS: usize = 15;
 
+/// Inliers, at most, that the first of them looks at: it is where the second begins.
+const ENOUGH: usize = 5_000;
+
 /// Where the last loss levels off, in standard deviations of the noise: far enough out that normal noise loses 2 % of its
 /// worth, and a false match beyond has no say.
 pub(super) const WIDTH: f64 = 6.0;
@@ -37,7 +40,8 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     let mut best = poses.score(start, threshold);
     let mut motion = start;
     if poses.inliers.len() >= FEWEST {
-        let subset = Subset::new(poses.observations, &poses.inliers);
+        let some = poses.inliers.len().min(ENOUGH);
+        let subset = Subset::new(poses.observations, &poses.inliers[..some]);
         refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
         take_better(poses, &mut best, motion);
     }

@@ -17,13 +17,12 @@ use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
 use super::score::MANY;
 use super::search::Search;
-use super::significance::is_significant;
+use super::significance::{self, is_significant};
 use super::transfer::square_error;
 use super::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
-use crate::degeneracy::diagnose;
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
-use crate::{Degeneracy, RelativePose};
+use crate::{Degeneracy, InputError, RelativePose};
 
 /// Poses closer than this in rotation and in the direction of translation (radians) are the same answer.
 const SAME: f64 = 0.02;
@@ -69,9 +68,11 @@ pub(super) fn conclude(
     poses.score(polished.scored.motion, poses.threshold);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
+    let false_matches =
+        if observations.len() < MANY { Vec::new() } else { significance::false_matches(observations) };
     let agrees = match observations.len() {
         ..MANY => inliers >= MIN_MATCHES,
-        _ => is_significant(poses, &polished.scored.motion, iterations),
+        _ => is_significant(poses, &polished.scored.motion, iterations, &false_matches),
     };
     if !agrees {
         return Err(no_pose(observations, poses.threshold, inliers));
@@ -81,11 +82,31 @@ pub(super) fn conclude(
     let some = &poses.inliers[..inliers.min(DIAGNOSED)];
     let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
     if verdict.model != Model::PureRotation && observations.is_line(&some, poses.threshold) {
-        return Err(degenerate(Degeneracy::Collinear));
+        return Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()));
     }
-    let estimate = assemble(poses, &polished, &others, &of_few, &verdict, iterations, answer);
+    let found = Found {
+        polished,
+        others: &others,
+        of_few: &of_few,
+        verdict,
+        false_matches: &false_matches,
+        iterations,
+        answer,
+    };
+    let estimate = assemble(poses, &found);
     // A whole family of poses is no pose.
-    estimate.ok_or_else(|| degenerate(diagnose(&observations.matches[..observations.len().min(DIAGNOSED)])))
+    estimate.ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))
+}
+
+/// All that an estimate is made of.
+struct Found<'a> {
+    polished: Polished,
+    others: &'a [Alternative],
+    of_few: &'a [Scored],
+    verdict: Verdict,
+    false_matches: &'a [Observations],
+    iterations: usize,
+    answer: Answer,
 }
 
 /// One of the motions of a plane: as its homography has it, and refined as any other motion.
@@ -130,15 +151,8 @@ fn replace(poses: &mut PoseScorer, polished: &mut Polished, others: &mut [Altern
     }
 }
 
-fn assemble(
-    poses: &mut PoseScorer,
-    polished: &Polished,
-    others: &[Alternative],
-    of_few: &[Scored],
-    verdict: &Verdict,
-    iterations: usize,
-    answer: Answer,
-) -> Option<Estimate> {
+fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
+    let Found { polished, others, of_few, verdict, false_matches, iterations, answer } = *found;
     let observations = poses.observations;
     let sigma = polished.sigma;
     let model = verdict.model;
@@ -168,7 +182,7 @@ fn assemble(
     let size = length(observations, &motion, &inliers, sigma);
     let covariance = match model {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
-        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size),
+        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size, false_matches),
     }?;
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {
