@@ -100,6 +100,11 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn sum(self) -> $real {
+                self.0.into_iter().sum()
+            }
+
+            #[inline(always)]
             fn store(self, out: &mut [$real]) {
                 out[..N].copy_from_slice(&self.0);
             }
