@@ -43,11 +43,9 @@ impl<L: Lanes<f64>, const K: usize> Reflection<L, K> {
             *sum = v[i].mul_add(x[i], *sum);
         }
         let dot = (even + odd) * self.factor;
-        // No use is made of the rows ahead of the first.
-        for i in K.max(FIRST)..10 {
-            x[i] = dot.neg_mul_add(v[i], x[i]);
-        }
-        for i in K + 1..FIRST {
+        // Row `K` has no further use where it is ahead of those that are used.
+        let from = if K < FIRST { K + 1 } else { K };
+        for i in from..10 {
             x[i] = dot.neg_mul_add(v[i], x[i]);
         }
     }
