@@ -149,11 +149,11 @@ mod tests {
     #[test]
     fn minors_are_determinants() {
         let entry = |n: usize, i: usize, j: usize| ((n + 1) as f64 * (i * 4 + j + 1) as f64).sin();
-        let m: [Matrix4<f64>; 6] = std::array::from_fn(|n| Matrix4::from_fn(|i, j| entry(n, i, j)));
+        let m: [Matrix4<f64>; 6] = from_fn(|n| Matrix4::from_fn(|i, j| entry(n, i, j)));
         let minors = minors_at_points(&m);
         for (p, point) in POINTS.iter().enumerate() {
             let q = Vector4::from(*point);
-            let columns: [Vector4<f64>; 7] = std::array::from_fn(|n| if n == 0 { q } else { m[n - 1] * q });
+            let columns: [Vector4<f64>; 7] = from_fn(|n| if n == 0 { q } else { m[n - 1] * q });
             let mut row = 0;
             for (i, j, k, l) in quadruples() {
                 let determinant =
