@@ -10,7 +10,7 @@
 //! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](super::PerFrame).
 
 use super::estimate::{Estimate, HoldReason, PoseEstimator};
-use super::fit::{Fitted, Known, Plane, Workspace};
+use super::fit::{Fitted, Plane, Problem, Workspace};
 use super::reference::DepthReference;
 use super::source::PoseSource;
 use nalgebra::Vector3;
@@ -257,9 +257,20 @@ impl<S: PoseSource> DepthFilter<S> {
 
     /// Fits the image by one hypothesis, from its last pose.
     fn fit(&mut self, hypothesis: usize) -> Option<Fitted> {
-        let Hypothesis { reference, pose, .. } = &self.hypotheses[hypothesis];
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        self.workspace.fit(&known, &self.frame, reference, *pose)
+        let start = self.hypotheses[hypothesis].pose;
+        self.fit_at(hypothesis, start)
+    }
+
+    /// The same from another pose.
+    fn fit_at(&mut self, hypothesis: usize, start: RelativePose) -> Option<Fitted> {
+        let problem = Problem {
+            goal: &self.goal,
+            frame: &self.frame,
+            reference: &self.hypotheses[hypothesis].reference,
+            sigma: self.sigma,
+            plane: self.options.plane,
+        };
+        self.workspace.fit(&problem, start)
     }
 
     /// Leaves out the feature that disturbs most, until the rest passes or too little is left.
@@ -365,11 +376,14 @@ impl<S: PoseSource> DepthFilter<S> {
     /// there already.
     fn adopt(&mut self, pose: RelativePose) {
         self.spare.reference.set_flat(self.options.spread);
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        let (frame, reference) = (&self.frame, &self.spare.reference);
-        let Some(fitted) = self.workspace.fit_from(&known, frame, reference, pose, &self.proposed) else {
-            return;
+        let problem = Problem {
+            goal: &self.goal,
+            frame: &self.frame,
+            reference: &self.spare.reference,
+            sigma: self.sigma,
+            plane: self.options.plane,
         };
+        let Some(fitted) = self.workspace.fit_from(&problem, pose, &self.proposed) else { return };
         let same = |h: &Hypothesis| {
             h.pose.rotation_error(&fitted.pose) < 1e-3 && (h.pose.t_21 - fitted.pose.t_21).norm() < 1e-3
         };
@@ -390,11 +404,8 @@ impl<S: PoseSource> DepthFilter<S> {
     fn search(&mut self) -> Result<(), HoldReason> {
         self.solve()?;
         let mut best: Option<Fitted> = None;
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        for candidate in self.candidates.iter() {
-            let reference = &self.hypotheses[0].reference;
-            let fitted = self.workspace.fit(&known, &self.frame, reference, candidate.pose);
-            if let Some(fitted) = fitted
+        for k in 0..self.candidates.len() {
+            if let Some(fitted) = self.fit_at(0, self.candidates[k].pose)
                 && best.is_none_or(|b| fitted.cost < b.cost)
             {
                 best = Some(fitted);
