@@ -99,8 +99,8 @@ pub struct DepthFilter<S> {
     workspace: Workspace,
     frame: Vec<Option<[f64; 2]>>,
     proposed: Vec<f64>,
-    /// Of each feature, its places in the first images.
-    first: Vec<Vec<[f64; 2]>>,
+    /// Of each feature, its places in the first images: so many that are set, in a list long enough for all.
+    first: Vec<(usize, Vec<[f64; 2]>)>,
     first_seen: usize,
     matches: Vec<Correspondence>,
     candidates: Candidates,
@@ -129,7 +129,7 @@ impl<S: PoseSource> DepthFilter<S> {
             workspace: Workspace::new(n),
             frame: vec![None; n],
             proposed: vec![1.0; n],
-            first: (0..n).map(|_| Vec::with_capacity(options.first_images)).collect(),
+            first: vec![(0, vec![[0.0; 2]; options.first_images.max(1)]); n],
             first_seen: 0,
             matches: Vec::with_capacity(n),
             candidates: Candidates::new(),
@@ -218,17 +218,19 @@ impl<S: PoseSource> DepthFilter<S> {
 
     /// Collects the first images, and replaces the last of them by their mean.
     fn average_first(&mut self) -> Result<(), HoldReason> {
-        for (places, seen) in self.first.iter_mut().zip(&self.frame) {
-            places.extend(seen.filter(|_| places.len() < places.capacity()));
+        for ((count, places), seen) in self.first.iter_mut().zip(&self.frame) {
+            if let (Some(seen), Some(place)) = (seen, places.get_mut(*count)) {
+                (*place, *count) = (*seen, *count + 1);
+            }
         }
         self.first_seen += 1;
         if self.first_seen < self.options.first_images {
             return Err(HoldReason::Starting);
         }
         let reach = self.options.gate * self.options.noise;
-        for (seen, places) in self.frame.iter_mut().zip(&mut self.first) {
-            *seen = mean_around_median(places, reach).filter(|_| 2 * places.len() > self.first_seen);
-            places.clear();
+        for (seen, (count, places)) in self.frame.iter_mut().zip(&mut self.first) {
+            let found = std::mem::take(count);
+            *seen = mean_around_median(&mut places[..found], reach).filter(|_| 2 * found > self.first_seen);
         }
         self.first_seen = 0;
         if self.seen() < self.options.min_features { Err(HoldReason::TooFewFeatures) } else { Ok(()) }
