@@ -79,7 +79,7 @@ laws!(quest: Subject {
     solver: SolverName::Quest,
     smallest_parallax: 1e-8,
     missed_at_small_parallax: &[(View::Everywhere, 391), (View::Everywhere, 776)],
-    incomplete_when_rotated: &[55],
+    incomplete_when_rotated: &[],
 });
 laws!(quest_eigen: Subject {
     solver: SolverName::QuestEigen,

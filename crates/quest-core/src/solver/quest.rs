@@ -116,8 +116,9 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
 /// A double root is known to the square root of rounding; times what the elimination loses.
 const NEARLY_REAL: f64 = 1e-4;
 
-/// An elimination that comes this close to singular has lost half of its digits.
-const SMALL_PIVOT: f64 = 1e-8;
+/// An elimination that comes this close to singular has lost five digits; clusters of roots lose the others. One noisy problem in
+/// five hundred is.
+const SMALL_PIVOT: f64 = 2e-5;
 
 /// Orthogonal changes of the null space's basis, for another attempt where the first did badly: the last
 /// basis vector may be absent from a solution, which puts its root at infinity.
