@@ -7,17 +7,18 @@
 
 use nalgebra::Complex;
 
-use super::square_root::SquareRoot;
+use super::number::Number;
+use super::two::Two;
 
-/// Where bisection gives up on telling two roots apart, in halvings of an interval.
-const MAX_DEPTH: u32 = 45;
+/// Where trisection gives up on telling two roots apart: at a third of a third of an interval, and so on.
+const MAX_DEPTH: u32 = 28;
 
 /// Steps to refine a root; seven are usual.
 const MAX_STEPS: usize = 80;
 
-/// Where the line is first divided. None of these is a likely root, as zero is where a basis vector is itself a
-/// solution: there rounding decides the sign.
-const SPLITS: [f64; 3] = [-0.93, 0.07, 1.11];
+/// Where the line is first divided, by even angles on the circle that it closes to at infinity. None of these is a likely root,
+/// as zero is where a basis vector is itself a solution: there rounding decides the sign.
+const SPLITS: [[f64; 2]; 4] = [[-4.7, -1.53], [-0.66, -0.19], [0.21, 0.69], [1.48, 5.1]];
 
 /// A square of a gap, relative to the roots, at which rounding in the coefficients begins to decide what is real; one noisy
 /// five-point problem in two hundred has it.
@@ -51,8 +52,9 @@ pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {
         return RealRoots { values: [0.0; N], len: 0, certain: false, close: false };
     };
     let mut brackets = Brackets { items: [Bracket::default(); N], len: 0, certain: true };
-    let ends = SPLITS.map(|x| End { x, changes: chain.sign_changes(x) });
-    let [first, .., last] = ends;
+    let ends = SPLITS.map(|x| chain.ends(x));
+    let ends = ends.as_flattened();
+    let (first, last) = (ends[0], ends[ends.len() - 1]);
     if let Some(below) = chain.bound(-1.0, first) {
         chain.isolate(below, first, MAX_DEPTH, &mut brackets);
     }
@@ -70,11 +72,18 @@ pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {
 struct Bracket {
     low: f64,
     high: f64,
-    /// The best estimate.
-    x: f64,
     /// Whether the polynomial is negative at `low`.
     negative_below: bool,
-    is_refined: bool,
+}
+
+impl Bracket {
+    /// `None` where there is no root, rounding having decided a count.
+    #[inline]
+    fn new<const N: usize>(p: &[f64; N], low: f64, high: f64) -> Option<Self> {
+        let [below, above] = value(p, Two::new([low, high])).to_array();
+        let negative_below = below < 0.0;
+        (negative_below != (above < 0.0)).then_some(Self { low, high, negative_below })
+    }
 }
 
 /// The intervals of all roots.
@@ -94,61 +103,85 @@ impl<const N: usize> Brackets<N> {
 
     /// The roots: Newton's iteration, bisection where it would leave the bracket.
     ///
-    /// A step of each in turn: the steps of one root wait for each other, those of different roots do not.
-    fn refined(mut self, p: &[f64; N]) -> RealRoots<N> {
+    /// A step of each two in turn: the steps of one root wait for each other, those of different roots do not.
+    fn refined(&self, p: &[f64; N]) -> RealRoots<N> {
+        let mut pairs = [TwoBrackets::default(); N];
+        let pairs = &mut pairs[..self.len.div_ceil(2)];
+        for (pair, brackets) in pairs.iter_mut().zip(self.items[..self.len].chunks(2)) {
+            *pair = TwoBrackets::new(&brackets[0], &brackets[brackets.len() - 1]);
+        }
         for _ in 0..MAX_STEPS {
             let mut is_done = true;
-            for bracket in &mut self.items[..self.len] {
-                if !bracket.is_refined {
-                    bracket.step(p);
-                    is_done = false;
-                }
+            for pair in &mut *pairs {
+                is_done &= pair.step(p);
             }
             if is_done {
                 break;
             }
         }
-        let values = self.items.map(|bracket| bracket.x);
+        let mut values = [0.0; N];
+        for (values, pair) in values.chunks_mut(2).zip(pairs) {
+            let roots = pair.root(p).to_array();
+            values.copy_from_slice(&roots[..values.len()]);
+        }
         RealRoots { values, len: self.len, certain: self.certain, close: false }
     }
 }
 
-impl Bracket {
-    /// `None` where there is no root, rounding having decided a count.
-    fn new<const N: usize>(p: &[f64; N], low: f64, high: f64) -> Option<Self> {
-        let negative_below = value(p, low) < 0.0;
-        let x = 0.5 * (low + high);
-        (negative_below != (value(p, high) < 0.0)).then_some(Self {
+/// Two intervals with one root each, side by side.
+#[derive(Clone, Copy, Default)]
+struct TwoBrackets {
+    low: Two,
+    high: Two,
+    /// The best estimates, and how far the last steps moved them.
+    x: Two,
+    moved: Two,
+    /// Masks: whether the polynomial is positive at `low`, and whether the estimate is good to a third of its digits.
+    positive_below: Two,
+    is_near: Two,
+}
+
+impl TwoBrackets {
+    #[inline]
+    fn new(first: &Bracket, second: &Bracket) -> Self {
+        let low = Two::new([first.low, second.low]);
+        let high = Two::new([first.high, second.high]);
+        let sign = [first, second].map(|bracket| if bracket.negative_below { -1.0 } else { 1.0 });
+        Self {
             low,
             high,
-            x,
-            negative_below,
-            is_refined: false,
-        })
+            x: (low + high) * 0.5,
+            moved: high - low,
+            positive_below: Two::new(sign).simd_gt(Two::ZERO),
+            is_near: Two::ZERO,
+        }
     }
 
+    /// A step of both unless they are near already. Whether they are then.
     #[inline]
-    fn step<const N: usize>(&mut self, p: &[f64; N]) {
-        let (value, slope) = value_and_slope(p, self.x);
-        if (value < 0.0) == self.negative_below {
-            self.low = self.x;
-        } else {
-            self.high = self.x;
-        }
-        let newton = self.x - value / slope;
-        let inside = newton > self.low && newton < self.high;
-        let next = if inside { newton } else { 0.5 * (self.low + self.high) };
-        let moved = (next - self.x).abs();
-        self.x = next;
+    fn step<const N: usize>(&mut self, p: &[f64; N]) -> bool {
+        let Self { x, .. } = *self;
+        let (value, slope) = value_and_slope(p, x);
+        let is_below = value.simd_lt(Two::ZERO) ^ self.positive_below;
+        self.low = is_below.select(x, self.low);
+        self.high = is_below.select(self.high, x);
+        let newton = x - value / slope;
+        let inside = newton.simd_gt(self.low) & newton.simd_lt(self.high);
+        let next = inside.select(newton, (self.low + self.high) * 0.5);
+        let moved = (next - x).abs();
+        self.x = self.is_near.select(x, next);
+        self.moved = self.is_near.select(self.moved, moved);
         // Convergence is quadratic: a step of a third of the digits leaves a third, the last one none.
-        if moved <= 1e-5 * (1e-3 + next.abs()) {
-            let (value, slope) = value_and_slope(p, next);
-            let last = next - value / slope;
-            if (last - next).abs() <= moved {
-                self.x = last;
-            }
-            self.is_refined = true;
-        }
+        self.is_near |= moved.simd_le((next.abs() + 1e-3) * 1e-5);
+        self.is_near.all()
+    }
+
+    /// The roots, by one more step from near.
+    #[inline]
+    fn root<const N: usize>(&self, p: &[f64; N]) -> Two {
+        let (value, slope) = value_and_slope(p, self.x);
+        let last = self.x - value / slope;
+        (last - self.x).abs().simd_le(self.moved).select(last, self.x)
     }
 }
 
@@ -156,7 +189,8 @@ impl Bracket {
 #[derive(Clone, Copy)]
 struct End {
     x: f64,
-    changes: u32,
+    /// A whole number.
+    changes: f64,
 }
 
 /// A Sturm chain `f_0 = p, f_1 ∝ p', f_{k+2} ∝ −(f_k mod f_{k+1})`, kept as the recurrence
@@ -225,16 +259,21 @@ impl<const N: usize> Chain<N> {
         self.magnified > MAGNIFIED || self.links[N - 3][2] < NEARLY_DOUBLE * (1.0 + root * root)
     }
 
-    /// How often the sign changes along the chain at `x`.
-    fn sign_changes(&self, x: f64) -> u32 {
-        let (mut upper, mut lower) = (self.last_linear[1] * x + self.last_linear[0], self.last);
-        let mut changes = u32::from((upper < 0.0) != (lower < 0.0));
+    /// How often the sign changes along the chain at two points, side by side: each member waits for those before.
+    #[inline]
+    fn ends(&self, points: [f64; 2]) -> [End; 2] {
+        let x = Two::new(points);
+        let (mut upper, mut lower) = (x * self.last_linear[1] + self.last_linear[0], Two::splat(self.last));
+        let mut is_negative = upper.simd_lt(Two::ZERO);
+        let mut changes = (is_negative ^ lower.simd_lt(Two::ZERO)) & Two::splat(1.0);
         for [offset, slope, weight] in self.links[..N - 2].iter().rev() {
-            let next = (slope * x + offset) * upper - weight * lower;
-            changes += u32::from((next < 0.0) != (upper < 0.0));
-            (upper, lower) = (next, upper);
+            (upper, lower) = ((x * *slope + *offset) * upper - lower * *weight, upper);
+            let was_negative = is_negative;
+            is_negative = upper.simd_lt(Two::ZERO);
+            changes += (is_negative ^ was_negative) & Two::splat(1.0);
         }
-        changes
+        let [first, second] = changes.to_array();
+        [End { x: points[0], changes: first }, End { x: points[1], changes: second }]
     }
 
     /// A point beyond all roots on the side of `direction` (±1) from `end`; `None` where there are none.
@@ -244,10 +283,9 @@ impl<const N: usize> Chain<N> {
         for [_, slope, _] in &self.links[..N - 2] {
             at_infinity += u32::from(slope * direction < 0.0);
         }
-        let mut bound = end;
+        let (mut bound, at_infinity) = (end, f64::from(at_infinity));
         while bound.changes != at_infinity {
-            bound.x = 4.0 * bound.x.abs().max(1.0) * direction;
-            bound.changes = self.sign_changes(bound.x);
+            [bound, _] = self.ends([4.0 * bound.x.abs().max(1.0) * direction; 2]);
             // A root this far out is one at infinity, of a polynomial of lower degree.
             if bound.x.abs() > 1e12 {
                 break;
@@ -257,39 +295,40 @@ impl<const N: usize> Chain<N> {
     }
 
     fn isolate(&self, from: End, to: End, depth: u32, brackets: &mut Brackets<N>) {
-        let count = from.changes.saturating_sub(to.changes);
-        match count {
-            0 => {}
-            1 => match Bracket::new(&self.p, from.x, to.x) {
+        let count = from.changes - to.changes;
+        if count < 1.0 {
+            return;
+        }
+        if count < 2.0 {
+            match Bracket::new(&self.p, from.x, to.x) {
                 Some(bracket) => brackets.push(bracket),
                 None => brackets.certain = false,
-            },
-            _ if depth == 0 => {
-                brackets.certain = false;
-                for _ in 0..count {
-                    let x = 0.5 * (from.x + to.x);
-                    brackets.push(Bracket { x, is_refined: true, ..Bracket::default() });
-                }
             }
-            _ => {
-                let x = 0.5 * (from.x + to.x);
-                let middle = End { x, changes: self.sign_changes(x) };
-                self.isolate(from, middle, depth - 1, brackets);
-                self.isolate(middle, to, depth - 1, brackets);
+        } else if depth == 0 {
+            brackets.certain = false;
+            brackets.push(Bracket { low: from.x, high: to.x, negative_below: false });
+            self.isolate(End { changes: from.changes - 1.0, ..from }, to, depth, brackets);
+        } else {
+            let third = (to.x - from.x) / 3.0;
+            let [first, second] = self.ends([from.x + third, to.x - third]);
+            for [from, to] in [[from, first], [first, second], [second, to]] {
+                self.isolate(from, to, depth - 1, brackets);
             }
         }
     }
 }
 
-fn value<const N: usize>(p: &[f64; N], x: f64) -> f64 {
-    p[..N - 1].iter().rev().fold(p[N - 1], |value, c| value * x + c)
+#[inline]
+fn value<const N: usize>(p: &[f64; N], x: Two) -> Two {
+    p[..N - 1].iter().rev().fold(Two::splat(p[N - 1]), |value, c| value * x + *c)
 }
 
-fn value_and_slope<const N: usize>(p: &[f64; N], x: f64) -> (f64, f64) {
-    let (mut value, mut slope) = (p[N - 1], 0.0);
+#[inline]
+fn value_and_slope<const N: usize>(p: &[f64; N], x: Two) -> (Two, Two) {
+    let (mut value, mut slope) = (Two::splat(p[N - 1]), Two::ZERO);
     for c in p[..N - 1].iter().rev() {
         slope = slope * x + value;
-        value = value * x + c;
+        value = value * x + *c;
     }
     (value, slope)
 }

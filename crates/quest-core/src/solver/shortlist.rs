@@ -6,6 +6,7 @@ use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
 use super::motion::{Motion, Outcome};
+use super::two_motions::TwoMotions;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
 use crate::structure::{Completed, pair_with_depths, with_depths};
@@ -123,7 +124,7 @@ impl Shortlist {
         }
     }
 
-    /// Adds the solution of five constraints near `motion`, and the twisted one beside it; a start from which
+    /// Adds the solution of five constraints near `start`, and the twisted one beside it; a start from which
     /// Newton's iteration does not converge is kept as it is, and reported as `None`: it stands for a
     /// complex solution that happens to be nearly real.
     pub(crate) fn push_solution(
@@ -133,7 +134,32 @@ impl Shortlist {
         matches: &[Correspondence; 5],
     ) -> Option<Motion> {
         let mut motion = start;
-        match motion.solve_five(alignment, matches) {
+        let outcome = motion.solve_five(alignment, matches);
+        self.push_solved(start, motion, outcome)
+    }
+
+    /// The same for the first `count` of two starts. Whether all of them led to a solution.
+    pub(crate) fn push_solutions(
+        &mut self,
+        starts: &TwoMotions,
+        count: usize,
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) -> bool {
+        let mut motions = *starts;
+        let outcomes = motions.solve_five(alignment, matches);
+        let solved = motions.apart().into_iter().zip(outcomes);
+        let mut complete = true;
+        for (start, (motion, outcome)) in starts.apart().into_iter().zip(solved).take(count) {
+            let pushed =
+                start.zip(motion).and_then(|(start, motion)| self.push_solved(start, motion, outcome));
+            complete &= pushed.is_some();
+        }
+        complete
+    }
+
+    fn push_solved(&mut self, start: Motion, motion: Motion, outcome: Outcome) -> Option<Motion> {
+        match outcome {
             Outcome::Converged => {
                 self.push_pair(CandidateKind::Exact, motion);
                 Some(motion)
@@ -228,19 +254,24 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
 pub(crate) fn rank(out: &mut Candidates) {
-    // Positive numbers are ordered as their bits are: keys are compared as integers, and candidates moved once.
-    let key = |(k, c): (usize, &Candidate)| {
+    // Positive numbers are ordered as their bits are: keys are compared as integers, without branches.
+    let mut keys = [[0; 3]; Candidates::CAPACITY];
+    for (key, c) in keys.iter_mut().zip(out.iter()) {
         let residual = c.residual.max(ROUNDING).to_bits();
-        (usize::MAX - c.in_front, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits(), k)
-    };
-    let mut order = [(0, 0, 0, 0); Candidates::CAPACITY];
-    let order = &mut order[..out.len()];
-    for (place, candidate) in order.iter_mut().zip(out.iter().enumerate()) {
-        *place = key(candidate);
+        *key = [u64::MAX - c.in_front as u64, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits()];
     }
-    order.sort_unstable();
+    let keys = &keys[..out.len()];
+    let mut places = [0; Candidates::CAPACITY];
+    for (i, x) in keys.iter().enumerate() {
+        for (j, y) in keys[..i].iter().enumerate() {
+            let comes_first =
+                (x[0] < y[0]) | ((x[0] == y[0]) & ((x[1] < y[1]) | ((x[1] == y[1]) & (x[2] < y[2]))));
+            places[i] += usize::from(!comes_first);
+            places[j] += usize::from(comes_first);
+        }
+    }
     let unordered = out.clone();
-    for (place, (.., k)) in out.as_mut_slice().iter_mut().zip(order) {
-        *place = unordered[*k];
+    for (candidate, place) in unordered.iter().zip(places) {
+        out.as_mut_slice()[place] = *candidate;
     }
 }
