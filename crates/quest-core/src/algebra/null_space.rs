@@ -5,22 +5,14 @@ use super::two::Two;
 /// An orthonormal basis of the vectors orthogonal to the `R` rows of `a`, and the smallest pivot over the largest: how
 /// far the rows are from dependent.
 ///
-/// The longest remaining row is reflected first. `C = R + K`; `a` is overwritten.
+/// Rows that depend on those before leave nothing to reflect. `C = R + K`; `a` is overwritten.
 pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
     a: &mut [[f64; C]; R],
 ) -> ([[f64; C]; K], f64) {
     const { assert!(R + K == C) }
     let mut inverse = [0.0; R];
     let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
-    // Squared lengths of what is left of the rows: good enough to choose by.
-    let mut squares = a.each_ref().map(|row| dot(row, row));
     for k in 0..R {
-        let (mut longest, mut square) = (k, squares[k]);
-        for i in k + 1..R {
-            (longest, square) = if squares[i] > square { (i, squares[i]) } else { (longest, square) };
-        }
-        a.swap(k, longest);
-        squares.swap(k, longest);
         // The row becomes the reflection's vector v, with I − v vᵀ · inverse, zero ahead of entry k: loops of fixed length
         // are worth more than the products with these zeros. No entry is written alone: what reads two would wait for it.
         let (head, tail) = a.split_at_mut(k + 1);
@@ -36,9 +28,8 @@ pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
         for j in 0..C {
             v[j] -= image * Entries::<R, C>::ONLY[k][j];
         }
-        for (row, square) in tail.iter_mut().zip(&mut squares[k + 1..]) {
+        for row in tail {
             reflect(row, v, inverse[k]);
-            *square -= row[k] * row[k];
         }
     }
     let mut basis = [[0.0; C]; K];

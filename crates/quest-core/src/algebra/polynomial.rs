@@ -216,40 +216,45 @@ impl<const N: usize> Chain<N> {
             return None;
         }
         let p = p.map(|c| c * scale);
-        let (mut f, mut g) = (p, [0.0; N]);
-        for i in 1..N {
-            g[i - 1] = f[i] * i as f64 / degree as f64;
-        }
+        // Two coefficients a block, from the leading one down: where they stand does not depend on the degree.
+        let coefficient = |k: usize| if k <= degree { p[degree - k] } else { 0.0 };
+        let slope = |k: usize| coefficient(k) * (degree.saturating_sub(k) as f64 / degree as f64);
+        let mut f: [Two; N] = std::array::from_fn(|b| Two::new([coefficient(2 * b), coefficient(2 * b + 1)]));
+        let mut g: [Two; N] = std::array::from_fn(|b| Two::new([slope(2 * b), slope(2 * b + 1)]));
+        let blocks = N.div_ceil(2);
         let mut links = [[0.0; 3]; N];
         // The leading coefficients of all members are ±1, so that divisions are products.
         let mut sign = 1.0;
-        let largest = |p: &[f64; N]| p.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
-        let (mut error, mut error_below, mut magnified) = (largest(&f), largest(&g), 0.0_f64);
-        for (k, link) in links.iter_mut().enumerate().take(degree - 1) {
-            let d = degree - k;
-            let slope = f[d] * sign;
-            let offset = (f[d - 1] - slope * g[d - 2]) * sign;
-            let mut rest = [0.0; N];
-            rest[0] = offset * g[0] - f[0];
-            for i in 1..d - 1 {
-                rest[i] = offset * g[i] + slope * g[i - 1] - f[i];
+        let largest = |p: &[Two; N]| p.iter().fold(Two::ZERO, |largest, c| largest.max(c.abs())).to_array();
+        let [mut error, mut error_below] = [&f, &g].map(|p| largest(p)[0].max(largest(p)[1]));
+        let mut magnified = 0.0_f64;
+        for link in &mut links[..degree - 1] {
+            let ([f0, f1], [_, g1]) = (f[0].to_array(), g[0].to_array());
+            let slope = f0 * sign;
+            let offset = (f1 - slope * g1) * sign;
+            let mut rest = [Two::ZERO; N];
+            for b in 0..blocks {
+                let between = Two::new([g[b].to_array()[1], g[b + 1].to_array()[0]]);
+                rest[b] = g[b + 1] * slope + between * offset - f[b + 1];
             }
-            let weight = rest[d - 2].abs();
+            let leading = rest[0].to_array()[0];
+            let weight = leading.abs();
             let inverse = 1.0 / weight;
             if !inverse.is_finite() {
                 return None;
             }
-            for c in &mut rest[..d - 1] {
+            for c in &mut rest[..blocks] {
                 *c *= inverse;
             }
             (error, error_below) = (error_below, ((1.0 + offset.abs()) * error_below + error) * inverse);
             magnified = magnified.max(error_below);
             *link = [offset, slope, weight];
-            sign = 1.0_f64.copysign(rest[d - 2]);
+            sign = 1.0_f64.copysign(leading);
             (f, g) = (g, rest);
         }
-        let finite = p.iter().chain(&f).chain(&g).all(|c| c.is_finite());
-        finite.then_some(Self { p, links, last_linear: [f[0], f[1]], last: g[0], magnified })
+        let ([slope, offset], [last, _]) = (f[0].to_array(), g[0].to_array());
+        let finite = p.iter().chain([&slope, &offset, &last]).all(|c| c.is_finite());
+        finite.then_some(Self { p, links, last_linear: [offset, slope], last, magnified })
     }
 
     /// Whether the number of real roots may be rounding's: the chain has lost its digits, or nearly breaks off at its end, where
@@ -320,17 +325,24 @@ impl<const N: usize> Chain<N> {
 
 #[inline]
 fn value<const N: usize>(p: &[f64; N], x: Two) -> Two {
-    p[..N - 1].iter().rev().fold(Two::splat(p[N - 1]), |value, c| value * x + *c)
+    value_and_slope(p, x).0
 }
 
+/// By the even and the odd powers apart, which do not wait for each other: with `y = x²`
+/// `p = e(y) + x o(y)` and `p' = o(y) + 2 x (e'(y) + x o'(y))`.
 #[inline]
 fn value_and_slope<const N: usize>(p: &[f64; N], x: Two) -> (Two, Two) {
-    let (mut value, mut slope) = (Two::splat(p[N - 1]), Two::ZERO);
-    for c in p[..N - 1].iter().rev() {
-        slope = slope * x + value;
-        value = value * x + *c;
+    let y = x * x;
+    let ([mut even, mut odd], [mut even_slope, mut odd_slope]) = ([Two::ZERO; 2], [Two::ZERO; 2]);
+    for k in (0..N.div_ceil(2)).rev() {
+        even_slope = even_slope * y + even;
+        even = even * y + p[2 * k];
+        if 2 * k + 1 < N {
+            odd_slope = odd_slope * y + odd;
+            odd = odd * y + p[2 * k + 1];
+        }
     }
-    (value, slope)
+    (even + x * odd, odd + (x + x) * (even_slope + x * odd_slope))
 }
 
 /// One of each pair of complex roots of `p`, that with the positive imaginary part, given all its real roots.

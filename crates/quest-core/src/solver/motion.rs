@@ -34,15 +34,6 @@ pub(crate) struct Motion {
     pub(crate) direction: Vector3<f64>,
 }
 
-/// How an iteration ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
-    /// The last step was rounding.
-    Converged,
-    /// The steps ran out, or led away.
-    Stalled,
-}
-
 impl Motion {
     /// The other rotation with the same essential matrix: turned by 180° about the translation, `q' = t ⊗ q`.
     pub(crate) fn twisted(&self) -> Self {
@@ -118,15 +109,10 @@ impl Motion {
         sines.into_iter().fold(0.0, f64::max)
     }
 
-    /// Newton's iteration to the solution of five constraints.
-    pub(crate) fn solve_five(&mut self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Outcome {
-        let mut motions = TwoMotions::same(self);
-        let [outcome, _] = motions.solve_five(alignment, matches);
-        match motions.apart() {
-            [Some(motion), _] => *self = motion,
-            _ => return Outcome::Stalled,
-        }
-        outcome
+    /// The solution of five constraints that Newton's iteration leads to; `None` where it does not converge.
+    pub(crate) fn solution(&self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Option<Self> {
+        let [solution, _] = TwoMotions::same(self).solutions(alignment, matches);
+        solution
     }
 
     /// Levenberg–Marquardt to a local minimum of the summed squares of the Sampson errors. Matches further than `cutoff`

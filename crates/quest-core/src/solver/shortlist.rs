@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
-use super::motion::{Motion, Outcome};
+use super::motion::Motion;
 use super::two_motions::TwoMotions;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
@@ -117,7 +117,9 @@ impl Shortlist {
         if self.iter().any(|old| !replaces(old) && old.covers(new, same)) {
             return;
         }
-        self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
+        if self.iter().any(replaces) {
+            self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
+        }
         if let Some(place) = self.items.get_mut(self.len) {
             *place = *new;
             self.len += 1;
@@ -133,9 +135,12 @@ impl Shortlist {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> Option<Motion> {
-        let mut motion = start;
-        let outcome = motion.solve_five(alignment, matches);
-        self.push_solved(start, motion, outcome)
+        let solution = start.solution(alignment, matches);
+        match solution {
+            Some(motion) => self.push_pair(CandidateKind::Exact, motion),
+            None => self.push(CandidateKind::FromComplex, start),
+        }
+        solution
     }
 
     /// The same for the first `count` of two starts. Whether all of them led to a solution.
@@ -146,29 +151,15 @@ impl Shortlist {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> bool {
-        let mut motions = *starts;
-        let outcomes = motions.solve_five(alignment, matches);
-        let solved = motions.apart().into_iter().zip(outcomes);
-        let mut complete = true;
-        for (start, (motion, outcome)) in starts.apart().into_iter().zip(solved).take(count) {
-            let pushed =
-                start.zip(motion).and_then(|(start, motion)| self.push_solved(start, motion, outcome));
-            complete &= pushed.is_some();
-        }
-        complete
-    }
-
-    fn push_solved(&mut self, start: Motion, motion: Motion, outcome: Outcome) -> Option<Motion> {
-        match outcome {
-            Outcome::Converged => {
-                self.push_pair(CandidateKind::Exact, motion);
-                Some(motion)
-            }
-            Outcome::Stalled => {
+        let solutions = starts.solutions(alignment, matches);
+        for (k, solution) in solutions.iter().enumerate().take(count) {
+            if let Some(motion) = solution {
+                self.push_pair(CandidateKind::Exact, *motion);
+            } else if let Some(start) = starts.apart()[k] {
                 self.push(CandidateKind::FromComplex, start);
-                None
             }
         }
+        solutions[..count].iter().all(Option::is_some)
     }
 
     /// The local minima of the summed squares of the Sampson errors over all matches that these motions lead to, and the

@@ -7,7 +7,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::aligned::Alignment;
 use super::essential::decomposed;
-use super::motion::{Motion, Outcome};
+use super::motion::Motion;
 use crate::Correspondence;
 use crate::algebra::two::{Two, TwoVectors, both, cross, dot};
 
@@ -59,22 +59,22 @@ impl TwoMotions {
         })
     }
 
-    /// Newton's iteration of both to the solution of five constraints.
+    /// The solutions of five constraints that Newton's iteration leads to; `None` where it does not converge.
     ///
     /// Not in the epipolar frame: its rounding would be that of the constraints, and with a parallax of 1e-8 shows.
-    pub(crate) fn solve_five(
-        &mut self,
+    pub(crate) fn solutions(
+        &self,
         alignment: &Alignment,
         matches: &[Correspondence; 5],
-    ) -> [Outcome; 2] {
+    ) -> [Option<Motion>; 2] {
         let limit = alignment.direction_resolution().max(1e-7).powi(2);
-        let (mut is_over, mut has_converged) = (Two::ZERO, Two::ZERO);
+        let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
         for _ in 0..MAX_NEWTON_STEPS {
-            let (next, square) = self.stepped(matches);
+            let (next, square) = motions.stepped(matches);
             // Not a number is no step either.
             let is_step = square.simd_le(Two::splat(1.0));
-            self.q_21 = select(is_step & !is_over, &next.q_21, &self.q_21);
-            self.direction = select(is_step & !is_over, &next.direction, &self.direction);
+            motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
+            motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
             // Quadratic: the error left is the square of the step.
             has_converged |= square.simd_lt(Two::splat(limit)) & !is_over;
             is_over |= has_converged | !is_step;
@@ -82,8 +82,8 @@ impl TwoMotions {
                 break;
             }
         }
-        let converged = has_converged.to_bitmask();
-        [1, 2].map(|lane| if converged & lane != 0 { Outcome::Converged } else { Outcome::Stalled })
+        let ([first, second], converged) = (motions.apart(), has_converged.to_bitmask());
+        [first.filter(|_| converged & 1 != 0), second.filter(|_| converged & 2 != 0)]
     }
 
     /// After one step, and its squared length (radians).
