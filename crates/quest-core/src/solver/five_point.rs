@@ -21,7 +21,7 @@ use super::aligned::{Alignment, DEPENDENT, GRAM_DEPENDENT};
 use super::cubics::combine;
 use super::essential::{decompose, real_part, twisted};
 use super::least_squares::{outer, principal_basis};
-use super::motion::{Motion, Outcome};
+use super::motion::Motion;
 use super::shortlist::{Shortlist, is_answered};
 use super::trace_cubics::Basis;
 use crate::algebra::null_space;
@@ -173,9 +173,8 @@ impl Solutions<'_> {
             && motion.largest_sine(five) > PRECISE
         {
             let aligned = Alignment::with_rotation(motion.q_21, five);
-            if motion.solve_five(&aligned, five) == Outcome::Stalled {
-                return false;
-            }
+            let Some(solution) = motion.solution(&aligned, five) else { return false };
+            motion = solution;
         }
         let before = self.shortlist.count(CandidateKind::Exact);
         self.shortlist.push_pair(CandidateKind::Exact, motion);
