@@ -1,10 +1,10 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
-//! It is `1.10 σ² H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factor the price of the last
+//! It is `1.02 σ² H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factor the price of the last
 //! refinement's loss. False matches among the inliers are not accounted for.
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
-use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, SVector, UnitQuaternion, Vector5};
+use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
 
 use super::length::{Length, length};
 use super::loss::Truncated;
@@ -14,9 +14,9 @@ use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::Motion;
 
-/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with the loss of Geman and
-/// `McClure` at three standard deviations.
-const EFFICIENCY: f64 = 1.10;
+/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with a biweight of six standard
+/// deviations.
+const EFFICIENCY: f64 = 1.02;
 
 /// Steps of the numerical derivatives of the length, in radians.
 const STEP: f64 = 1e-5;
@@ -90,9 +90,4 @@ pub(super) fn of_rotation(
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
     Some(covariance)
-}
-
-/// What stands where the matches leave some direction open: so large that nothing is excluded.
-pub(super) fn unknown() -> Matrix6<f64> {
-    Matrix6::from_diagonal(&SVector::from([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]))
 }

@@ -12,9 +12,10 @@
 //! parallax, and so are `t` and `S` at the true motion: `R = R0` to first order in `p`, so that the symmetric part of
 //! `E = [t]× R R0ᵀ` is of order `p`.
 
-use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::null_space::null_space;
+use crate::algebra::number::Number;
 use crate::alignment::{best_rotation, best_rotation_of_lines, nearly_best_rotation};
 use crate::degeneracy::diagnose;
 use crate::{Correspondence, Degeneracy};
@@ -108,7 +109,7 @@ impl Alignment {
     #[inline]
     pub(crate) fn row(&self, b: &Vector3<f64>, c: &Vector3<f64>) -> Coordinates {
         let b = same_side(b, c);
-        let n = moment(&b, c) / self.parallax;
+        let n = moment(&b, c) * (1.0 / self.parallax);
         [
             n.x,
             n.y,
@@ -132,9 +133,9 @@ impl Alignment {
 
     /// The essential matrix with these coordinates, between the turned view 1 and view 2.
     #[inline]
-    pub(crate) fn essential<T: ComplexField<RealField = f64> + Copy>(&self, e: &[T; 9]) -> [[T; 3]; 3] {
+    pub(crate) fn essential<T: Number>(&self, e: &[T; 9]) -> [[T; 3]; 3] {
         let [tx, ty, tz, rest @ ..] = *e;
-        let [xx, yy, zz, xy, xz, yz] = rest.map(|s| s.scale(self.parallax));
+        let [xx, yy, zz, xy, xz, yz] = rest.map(|s| s.times(self.parallax));
         [[xx, xy - tz, xz + ty], [xy + tz, yy, yz - tx], [xz - ty, yz + tx, zz]]
     }
 

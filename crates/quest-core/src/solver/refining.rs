@@ -26,7 +26,7 @@ pub(crate) fn solve(
     kinds: Kinds,
     matches: &[Correspondence],
     out: &mut Candidates,
-    from_five: impl FnOnce(Kinds, &Alignment, &[Correspondence; 5]) -> Result<Shortlist, Degeneracy>,
+    from_five: impl FnOnce(Kinds, &Alignment, &[Correspondence; 5], &mut Shortlist) -> Result<(), Degeneracy>,
     starts: impl FnOnce(&Gram, &[Coordinates; 9]) -> Shortlist,
 ) {
     out.clear();
@@ -38,9 +38,10 @@ pub(crate) fn solve(
     if alignment.is_pure_rotation() {
         return pure_rotation(&alignment, matches, out);
     }
-    match from_five(kinds, &alignment, five) {
+    let mut shortlist = Shortlist::new();
+    match from_five(kinds, &alignment, five, &mut shortlist) {
         Err(degeneracy) => out.set_degeneracy(degeneracy),
-        Ok(shortlist) => {
+        Ok(()) => {
             if kinds == Kinds::All {
                 let q0_21 = alignment.q0_21;
                 out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
