@@ -96,7 +96,7 @@ fn lanes_are_the_scalar_solver() {
 
 /// Of nearly coincident solutions rounding decides which are real, and either of the two may lose a pair.
 #[test]
-#[ignore = "a minute: 100,000 scenes"]
+#[ignore = "ten seconds: 100,000 scenes"]
 fn lanes_are_the_scalar_solver_a_hundred_thousand_times() {
     let mut found = Instructions::ALL.map(|_| Comparison::default());
     for batch in 0..100 {
@@ -108,7 +108,7 @@ fn lanes_are_the_scalar_solver_a_hundred_thousand_times() {
         }
     }
     eprintln!("{found:?}");
-    assert!(found.iter().all(|found| found.flagged < 500 && found.unequal < 20));
+    assert!(found.iter().all(|found| found.flagged < 500 && found.unequal < 10));
 }
 
 #[test]
