@@ -18,6 +18,7 @@ mod moments;
 pub(crate) mod motion;
 pub mod nister;
 mod normalisation;
+mod one_line;
 pub mod quest;
 pub mod quest_eigen;
 mod refining;

@@ -11,7 +11,7 @@
 use super::aligned::{Alignment, Coordinates};
 use super::gram::Gram;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, consensus};
+use super::{Kinds, consensus, one_line};
 use crate::structure::translation_direction;
 use crate::{Candidates, Correspondence, Degeneracy};
 
@@ -38,8 +38,18 @@ pub(crate) fn solve(
     if alignment.is_pure_rotation() {
         return pure_rotation(&alignment, matches, out);
     }
+    if Alignment::all_but_one_turn(five) {
+        return out.set_degeneracy(Degeneracy::RankDeficient);
+    }
     let mut shortlist = Shortlist::new();
-    match from_five(kinds, &alignment, five, &mut shortlist) {
+    let found = match one_line::essential_matrices(five) {
+        Some(pair) => {
+            shortlist.push_essential(&pair, &alignment, five);
+            Ok(())
+        }
+        None => from_five(kinds, &alignment, five, &mut shortlist),
+    };
+    match found {
         Err(degeneracy) => out.set_degeneracy(degeneracy),
         Ok(()) => {
             if kinds == Kinds::All {

@@ -1,12 +1,13 @@
 //! From the rotations that a solver finds to the ranked list of candidates: what all solvers share.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
 use super::motion::Motion;
 use super::two_motions::TwoMotions;
+use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
 use crate::structure::{Completed, pair_with_depths, with_depths};
@@ -160,6 +161,19 @@ impl Shortlist {
             }
         }
         solutions[..count].iter().all(Option::is_some)
+    }
+
+    /// Adds the solutions near two real essential matrices.
+    pub(crate) fn push_essential(
+        &mut self,
+        pair: &[Matrix3<f64>; 2],
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) {
+        let two = std::array::from_fn(|i| std::array::from_fn(|j| Two::new(pair.map(|e| e[(i, j)]))));
+        for solution in TwoMotions::of_essential(&two).solutions(alignment, matches).into_iter().flatten() {
+            self.push_pair(CandidateKind::Exact, solution);
+        }
     }
 
     /// The local minima of the summed squares of the Sampson errors over all matches that these motions lead to, and the

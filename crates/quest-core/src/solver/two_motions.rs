@@ -14,6 +14,9 @@ use crate::algebra::two::{Two, TwoVectors, both, cross, dot};
 /// Newton's iteration takes one or two steps; a double root takes them all.
 const MAX_NEWTON_STEPS: usize = 10;
 
+/// The squares of five constraints whose unit bearings are rounded, with a margin.
+const ROUNDING: f64 = 1e-30;
+
 /// Quaternions, scalar first.
 type TwoQuaternions = [Two; 4];
 
@@ -69,14 +72,18 @@ impl TwoMotions {
     ) -> [Option<Motion>; 2] {
         let limit = alignment.direction_resolution().max(1e-7).powi(2);
         let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
+        let mut before = Two::splat(f64::INFINITY);
         for _ in 0..MAX_NEWTON_STEPS {
-            let (next, square) = motions.stepped(matches);
+            let Step { next, square, residual } = motions.stepped(matches);
             // Not a number is no step either.
             let is_step = square.simd_le(Two::splat(1.0));
             motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
             motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
-            // Quadratic: the error left is the square of the step.
-            has_converged |= square.simd_lt(Two::splat(limit)) & !is_over;
+            // Quadratic: the error left is the square of the step. Near another solution the steps of rounding are longer, and
+            // come to no end.
+            let is_rounding = square.simd_gt(before * 0.25) & residual.simd_lt(Two::splat(ROUNDING));
+            has_converged |= (square.simd_lt(Two::splat(limit)) | is_rounding) & !is_over;
+            before = square;
             is_over |= has_converged | !is_step;
             if is_over.all() {
                 break;
@@ -86,9 +93,8 @@ impl TwoMotions {
         [first.filter(|_| converged & 1 != 0), second.filter(|_| converged & 2 != 0)]
     }
 
-    /// After one step, and its squared length (radians).
     #[inline]
-    fn stepped(&self, matches: &[Correspondence; 5]) -> (Self, Two) {
+    fn stepped(&self, matches: &[Correspondence; 5]) -> Step {
         let t = &self.direction;
         let [e1, e2] = tangent_basis(t);
         let r_21 = rotation(&self.q_21);
@@ -99,14 +105,25 @@ impl TwoMotions {
             let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
             [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), -dot(&n, t)]
         });
+        let residual = equations.iter().fold(Two::ZERO, |sum, row| sum + row[5] * row[5]);
         let [w1, w2, w3, move1, move2] = solve(equations);
         let square = w1 * w1 + w2 * w2 + w3 * w3 + move1 * move1 + move2 * move2;
         // To first order a rotation by ω; any step of the iteration may differ from it to second order.
         let turn = [Two::splat(1.0), w1 * 0.5, w2 * 0.5, w3 * 0.5];
         let direction: TwoVectors = std::array::from_fn(|k| t[k] + (e1[k] * move1 + e2[k] * move2));
         let next = Self { q_21: normalized(&product(&turn, &self.q_21)), direction: normalized(&direction) };
-        (next, square)
+        Step { next, square, residual }
     }
+}
+
+/// A step of Newton's iteration.
+struct Step {
+    /// Where it leads.
+    next: TwoMotions,
+    /// Its squared length (radians).
+    square: Two,
+    /// The sum of the squared constraints before it.
+    residual: Two,
 }
 
 /// `x` where the mask is set, `y` elsewhere.
