@@ -21,7 +21,8 @@ Examples:
 
 The page shows both cameras, rays, and points at their depths in the frame of camera 1, each
 candidate to be switched on and off, and the residuals. It is one file of 5 MB that works without
-a network. Files are those of `quest-cli solve`; of JSON Lines the first pair is shown.
+a network. Files are those that `quest-cli solve` and `estimate` read, not their results, which have no
+matches; of JSON Lines the first pair is shown.
 
 Exit status: 0 a page, 1 no pose could be found, 2 bad input or arguments.";
 
