@@ -9,8 +9,8 @@ use quest_benches::SEED;
 use quest_benches::statistics::{percentile, sorted};
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
-    Choice, DepthFilter, DifferentialDriveLaw, Disturbances, Length, Limits, PerFrame, PoseEstimator, Safety,
-    Servo,
+    Choice, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, Length, Limits, PerFrame, Plane,
+    PoseEstimator, Safety, Servo,
 };
 use quest_core::solver::SolverName;
 
@@ -36,11 +36,17 @@ fn main() {
     for features in [5, 20] {
         let disturbances = Disturbances { noise_px: 0.5, rounded: true, ..Disturbances::default() };
         let rng = &mut scenario::generator(arguments.seed, 0);
-        let (world, mut robot) = scenario::random(Features::General, features, &disturbances, rng, |_| {
-            scenario::robot_start(Features::General)
-        });
+        let (mut world, mut robot) =
+            scenario::random(Features::General, features, &disturbances, rng, |_| {
+                scenario::robot_start(Features::General)
+            });
+        world.goal_images = 30;
         let goal = world.on_plane(&world.goal_pixels(rng));
-        let filter = DepthFilter::new(&goal, SolverName::Quest, world.filter_options(&LIMITS, 2.0));
+        let options = FilterOptions {
+            plane: Some(Plane { tilt: 0.002, height: 0.001 }),
+            ..world.filter_options(&LIMITS, 2.0)
+        };
+        let filter = DepthFilter::new(&goal, SolverName::Quest, options);
         let mut chosen = PerFrame::new(&goal, SolverName::Quest, Choice::Reprojection, Length::GoalDepths);
         chosen.set_depths(&world.points.iter().map(|x| x.z).collect::<Vec<_>>());
         let mut images = Vec::new();

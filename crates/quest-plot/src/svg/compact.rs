@@ -4,8 +4,12 @@ use std::fmt::Write;
 
 use super::{DASHED_WIDTH, FINE};
 
-/// How far a line may move, in fine units: half a unit of the file, a third of a line's width.
-const TOLERANCE: f64 = FINE as f64 / 2.0;
+/// How far a line may move, in fine units: an eighth of a unit of the file, so that curves stay smooth.
+const TOLERANCE: f64 = FINE as f64 / 8.0;
+/// A line that needs more points than this is a noisy one,
+const SMOOTH: usize = 64;
+/// which may move by half a unit, a third of its width.
+const TOLERANCE_OF_NOISE: f64 = FINE as f64 / 2.0;
 
 /// Lines and areas as paths in relative coordinates, without the points that nobody can tell from their neighbours, and with
 /// the dashes that plotters does not know.
@@ -40,7 +44,7 @@ fn path(element: &str) -> Option<String> {
     };
     let mut path = format!("<path {}{dashes}d=\"", attributes.replace("opacity=\"1\" ", ""));
     let mut last = [0, 0];
-    for (k, [x, y]) in thinned(&columns(&points)).into_iter().enumerate() {
+    for (k, [x, y]) in reduced(&points).into_iter().enumerate() {
         let (dx, dy) = (x - last[0], y - last[1]);
         let letter = ["M", "l", " "][k.min(2)];
         // A minus sign separates numbers, and commands need no space before them.
@@ -52,6 +56,13 @@ fn path(element: &str) -> Option<String> {
     path.push_str(if is_closed { "z\"" } else { "\"" });
     path.push_str(end);
     Some(path)
+}
+
+/// The points that the line needs.
+fn reduced(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
+    let points = columns(points);
+    let smooth = thinned(&points, TOLERANCE);
+    if smooth.len() > SMOOTH { thinned(&points, TOLERANCE_OF_NOISE) } else { smooth }
 }
 
 /// Of neighbours in the same column of units, as in noise over time, the first and the last, the highest and the lowest.
@@ -69,7 +80,7 @@ fn columns(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
 }
 
 /// The ends of the longest pieces from which no point is further than the tolerance: the method of Douglas and Peucker.
-fn thinned(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
+fn thinned(points: &[[i32; 2]], tolerance: f64) -> Vec<[i32; 2]> {
     let mut is_kept = vec![false; points.len()];
     let mut pieces = vec![(0, points.len().saturating_sub(1))];
     while let Some((first, last)) = pieces.pop() {
@@ -80,7 +91,7 @@ fn thinned(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
         }
         let distance = |k: &usize| distance(points[*k], points[first], points[last]);
         let farthest = (first + 1..last).max_by(|a, b| distance(a).total_cmp(&distance(b)));
-        if let Some(k) = farthest.filter(|k| distance(k) > TOLERANCE) {
+        if let Some(k) = farthest.filter(|k| distance(k) > tolerance) {
             pieces.extend([(first, k), (k, last)]);
         }
     }
@@ -117,14 +128,14 @@ mod tests {
     fn no_point_is_further_from_the_thinned_line_than_the_tolerance() {
         let wave = |k: i32| [8 * k, (400.0 * (0.1 * f64::from(k)).sin()).round() as i32];
         let points: Vec<_> = (0..500).map(wave).collect();
-        let kept = thinned(&points);
-        assert!(kept.len() < 250 && kept.len() > 30, "{}", kept.len());
+        let kept = thinned(&points, TOLERANCE);
+        assert!(kept.len() < 250 && kept.len() > 50, "{}", kept.len());
         for p in points {
             let nearest = kept.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
             assert!(nearest <= TOLERANCE);
         }
-        assert_eq!(thinned(&[[3, 4]]), [[3, 4]]);
-        assert!(thinned(&[]).is_empty());
+        assert_eq!(reduced(&[[3, 4]]), [[3, 4]]);
+        assert!(reduced(&[]).is_empty());
     }
 
     #[test]
