@@ -135,45 +135,10 @@ pub(crate) fn null_vector<T: ComplexField<RealField = f64> + Copy, const N: usiz
     x.iter().all(ComplexField::is_finite).then_some(x)
 }
 
-/// Solves the `N` equations in the rows of `a`, their right-hand sides in the last column (`M = N + 1`), with partial
-/// pivoting. `None` where they are singular. `a` is overwritten.
-pub(crate) fn solve<const N: usize, const M: usize>(a: &mut [[f64; M]; N]) -> Option<[f64; N]> {
-    const { assert!(M == N + 1) }
-    let mut x = [0.0; N];
-    for k in 0..N {
-        let mut pivot = k;
-        for i in k + 1..N {
-            if a[i][k].abs() > a[pivot][k].abs() {
-                pivot = i;
-            }
-        }
-        a.swap(k, pivot);
-        let row = a[k];
-        let inverse = 1.0 / row[k];
-        // Kept for the way back.
-        x[k] = inverse;
-        for other in &mut a[k + 1..] {
-            // Whole rows: what stands left of column k is not read again, and a fixed length vectorises.
-            let factor = other[k] * inverse;
-            for j in 0..M {
-                other[j] -= factor * row[j];
-            }
-        }
-    }
-    for k in (0..N).rev() {
-        let mut sum = a[k][N];
-        for j in k + 1..N {
-            sum -= a[k][j] * x[j];
-        }
-        x[k] *= sum;
-    }
-    x.iter().all(ComplexField::is_finite).then_some(x)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Complex, SMatrix, SVector};
+    use nalgebra::{Complex, SMatrix};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -233,17 +198,5 @@ mod tests {
             // The condition number of a random 6 × 6 matrix stays below 1e5 in a hundred draws.
             assert!(found.iter().zip(x).all(|(f, x)| (f - x).norm() < 1e-10));
         }
-    }
-
-    #[test]
-    fn solve_agrees_with_nalgebra_and_refuses_singular() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut a: [[f64; 6]; 5] =
-            std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-        let matrix = SMatrix::<f64, 5, 5>::from_fn(|i, j| a[i][j]);
-        let expected = matrix.lu().solve(&SVector::<f64, 5>::from_fn(|i, _| a[i][5])).unwrap();
-        assert!((SVector::from(solve(&mut a).unwrap()) - expected).norm() < 1e-12);
-        assert_eq!(solve(&mut [[1.0; 6]; 5]), None);
-        assert_eq!(solve(&mut [[f64::NAN; 6]; 5]), None);
     }
 }

@@ -1,6 +1,6 @@
 //! What the solutions are computed with: real numbers, complex ones, and two real ones side by side.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use nalgebra::Complex;
 
@@ -8,13 +8,16 @@ use super::two::Two;
 
 /// A number.
 pub(crate) trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + std::ops::Div<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// A real number.
     fn real(x: f64) -> Self;
 
     /// A multiple.
-    fn times(self, x: f64) -> Self;
+    #[inline]
+    fn times(self, x: f64) -> Self {
+        self * Self::real(x)
+    }
 
     /// The square root; of a complex number the one with a real part that is not negative, and without angles: a tenth of the
     /// time.
@@ -28,11 +31,6 @@ impl Number for f64 {
     #[inline]
     fn real(x: f64) -> Self {
         x
-    }
-
-    #[inline]
-    fn times(self, x: f64) -> Self {
-        self * x
     }
 
     #[inline]
@@ -79,11 +77,6 @@ impl Number for Two {
     #[inline]
     fn real(x: f64) -> Self {
         Self::splat(x)
-    }
-
-    #[inline]
-    fn times(self, x: f64) -> Self {
-        self * x
     }
 
     #[inline]

@@ -366,7 +366,7 @@ pub(crate) fn complex_roots<const N: usize>(
         let Some(root) = root else { break };
         divide_quadratic(&mut rest, degree, 2.0 * root.re, root.norm_sqr());
         degree -= 2;
-        let polished = newton_step(p, newton_step(p, root));
+        let polished = newton_step(p, root);
         let polished = if polished.re.is_finite() && polished.im.is_finite() { polished } else { root };
         // A double root, or two real ones that the chain did not tell apart, comes out with next to no imaginary part.
         out[found] = Complex::new(polished.re, polished.im.abs());

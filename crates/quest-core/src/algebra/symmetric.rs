@@ -112,22 +112,8 @@ fn longest<const N: usize>(squares: &[f64; N]) -> Option<usize> {
 /// The adjugate of a symmetric 4 × 4 matrix by its 2 × 2 minors.
 fn adjugate(m: &Matrix4<f64>) -> Matrix4<f64> {
     let minor = |r: usize, s: usize, i: usize, j: usize| m[(r, i)] * m[(s, j)] - m[(r, j)] * m[(s, i)];
-    let upper = [
-        minor(0, 1, 0, 1),
-        minor(0, 1, 0, 2),
-        minor(0, 1, 0, 3),
-        minor(0, 1, 1, 2),
-        minor(0, 1, 1, 3),
-        minor(0, 1, 2, 3),
-    ];
-    let lower = [
-        minor(2, 3, 0, 1),
-        minor(2, 3, 0, 2),
-        minor(2, 3, 0, 3),
-        minor(2, 3, 1, 2),
-        minor(2, 3, 1, 3),
-        minor(2, 3, 2, 3),
-    ];
+    let columns = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let [upper, lower] = [(0, 1), (2, 3)].map(|(r, s)| columns.map(|(i, j)| minor(r, s, i, j)));
     let e = |i: usize, j: usize| m[(i, j)];
     let mut a = Matrix4::zeros();
     a[(0, 0)] = e(1, 1) * lower[5] - e(1, 2) * lower[4] + e(1, 3) * lower[3];

@@ -56,7 +56,7 @@ impl PoseSolver for LiHartley {
             for &z in real.as_slice() {
                 hidden.point(z, 1.0).inspect(|point| solutions.push_real(point));
             }
-            solutions.doubtful = !real.certain || is_lopsided(&polynomial);
+            solutions.doubtful = real.close || !real.certain || is_lopsided(&polynomial);
             let mut complex = [Complex::from(0.0); 11];
             let count = complex_roots(&polynomial, real.as_slice(), &mut complex);
             for &z in &complex[..count] {
