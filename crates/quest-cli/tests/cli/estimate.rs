@@ -197,14 +197,14 @@ fn matches_that_determine_no_pose_are_refused_with_the_reason() {
 #[test]
 fn lines_keep_their_order_and_have_random_numbers_of_their_own() {
     let noisy = pair([0.5, 0.1, -0.2], 60, true);
-    let lines: String = (0..40)
+    let lines: Vec<_> = (0..40)
         .map(|i| {
             let mut line = if i % 7 == 0 { pair([0.5, 0.1, -0.2], 300, true) } else { noisy.clone() };
             line["name"] = json!(format!("pair {i}"));
-            format!("{line}\n")
+            line.to_string()
         })
         .collect();
-    let run = run_in(Path::new("."), &["estimate", "-"], lines.as_bytes());
+    let run = run_in(Path::new("."), &["estimate", "-"], lines.join("\n").as_bytes());
     let results: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((run.status, results.len()), (0, 40));
     for (i, result) in results.iter().enumerate() {
@@ -234,8 +234,8 @@ fn a_third_view_decides_between_the_poses_of_a_plane() {
         views
     };
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("12.json"), seen([0.4, 0.1, -0.3], &|i| i).to_string()).unwrap();
-    std::fs::write(folder.path().join("13.json"), seen([-0.3, 0.3, 0.2], &|i| 60 - i).to_string()).unwrap();
+    fs::write(folder.path().join("12.json"), seen([0.4, 0.1, -0.3], &|i| i).to_string()).unwrap();
+    fs::write(folder.path().join("13.json"), seen([-0.3, 0.3, 0.2], &|i| 60 - i).to_string()).unwrap();
     let with = |format: &str| {
         run_in(folder.path(), &["estimate", "12.json", "--third", "13.json", "--format", format], b"")
     };
