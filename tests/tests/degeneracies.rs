@@ -104,6 +104,117 @@ fn collinear() {
     assert!(verdict(&scene.matches).0.is_none());
 }
 
+/// Points on a line in one image alone: in a plane through that camera. The true pose is one of two times two.
+#[test]
+fn collinear_in_one_view() {
+    let plane = [[-0.4, 2.0], [-0.1, 2.6], [0.15, 3.5], [0.3, 2.2], [0.55, 2.9]];
+    let (u, v) = (Vector3::new(0.9, 0.4, 0.0), Vector3::new(0.1, 0.2, 1.0));
+    let points = plane.map(|[x, z]| (u * x + v) * z);
+    for q_21 in [pose().q_21, UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 3.0, 0.4))] {
+        for length in [1.0, 1e-3, 1e-6] {
+            let truth = RelativePose::new(q_21, Vector3::new(0.4, -0.2, 0.1) * length);
+            let first = Scene::from_points(truth, points.to_vec()).unwrap();
+            let exchanged: Vec<_> = first
+                .matches
+                .iter()
+                .map(|m| {
+                    Correspondence::from_bearings((*m.bearing2()).into(), (*m.bearing1()).into()).unwrap()
+                })
+                .collect();
+            for (matches, truth) in [(&first.matches, truth), (&exchanged, truth.inverse())] {
+                assert_eq!(verdict(matches), (None, 4));
+                for solver in SOLVERS {
+                    let found = solve(solver, Kinds::Exact, matches);
+                    let errors = found.iter().map(|c| c.pose.rotation_error(&truth));
+                    // Rounding, magnified where the two essential matrices come close.
+                    assert!(errors.fold(f64::INFINITY, f64::min) < 1e-9, "{solver:?} {length:e}");
+                }
+            }
+        }
+    }
+}
+
+/// Up to three points at infinity leave the pose determined, four the rotation alone.
+#[test]
+fn points_at_infinity() {
+    let truth = pose();
+    let points = [[0.3, 0.1, 2.0], [-0.2, 0.25, 3.0], [0.1, -0.4, 2.5], [-0.35, -0.1, 4.0], [0.45, 0.3, 1.7]];
+    for at_infinity in 0..6 {
+        // Which of them does not matter.
+        for start in 0..5 {
+            let matches: Vec<_> = (0..5)
+                .map(|i| {
+                    let [x, y, z] = points[(start + i) % 5];
+                    let a = Vector3::new(x, y, 1.0);
+                    let b = if i < at_infinity { truth.q_21 * a } else { truth.q_21 * (a * z) + truth.t_21 };
+                    Correspondence::from_bearings(a.into(), b.into()).unwrap()
+                })
+                .collect();
+            match at_infinity {
+                0..4 => {
+                    for solver in SOLVERS {
+                        let found = solve(solver, Kinds::Exact, &matches);
+                        let errors = found.iter().map(|c| c.pose.rotation_error(&truth));
+                        assert!(errors.fold(f64::INFINITY, f64::min) < 1e-12, "{at_infinity} {start}");
+                    }
+                }
+                4 => assert_eq!(verdict(&matches), (Some(Degeneracy::RankDeficient), 0)),
+                _ => assert_eq!(verdict(&matches), (Some(Degeneracy::PureRotation), 1)),
+            }
+        }
+    }
+}
+
+/// What is finite at the door is finite behind it: every pose is, and those called exact satisfy the constraints.
+#[test]
+fn hostile_bearings_give_finite_poses_or_a_reason() {
+    let one = scene(&SceneOptions::realistic(), SEED_DEGENERATE, 7);
+    let bearings: Vec<[[f64; 3]; 2]> =
+        one.matches.iter().map(|m| [(*m.bearing1()).into(), (*m.bearing2()).into()]).collect();
+    let changes: [(&str, fn([f64; 3]) -> [f64; 3]); 8] = [
+        ("z = 0", |[x, y, _]| [x, y, 0.0]),
+        ("negative zero", |[x, y, _]| [x, y, -0.0]),
+        ("denormal z", |[x, y, _]| [x, y, 5e-324]),
+        ("on an axis", |[x, _, _]| [x, 0.0, 1.0]),
+        ("behind", |x| x.map(|x| -x)),
+        ("1e149 long", |x| x.map(|x| 1e149 * x)),
+        ("1e-149 long", |x| x.map(|x| 1e-149 * x)),
+        ("rounded", |x| x.map(|x| (8.0 * x).round() / 8.0)),
+    ];
+    for (name, change) in changes {
+        // In which views, and of how many of the matches.
+        for (views, count) in [(1, 1), (1, 3), (1, 5), (2, 5), (3, 1), (3, 3), (3, 5)] {
+            let changed: Vec<_> = bearings
+                .iter()
+                .enumerate()
+                .map(|(i, &[a, b])| {
+                    let [first, second] = [1, 2].map(|bit| i < count && views & bit != 0);
+                    let (a, b) = (if first { change(a) } else { a }, if second { change(b) } else { b });
+                    Correspondence::from_bearings(a, b).unwrap()
+                })
+                .collect();
+            for solver in SolverName::ALL {
+                for kinds in [Kinds::Exact, Kinds::All] {
+                    let found = solve(solver, kinds, &changed);
+                    for c in found.iter() {
+                        let finite =
+                            c.pose.t_21.iter().chain(c.pose.q_21.coords.iter()).all(|x| x.is_finite());
+                        assert!(finite && c.residual.is_finite(), "{solver:?}, {name}, {views}, {count}");
+                    }
+                }
+            }
+            for solver in SOLVERS {
+                let exact = solve(solver, Kinds::Exact, &changed);
+                let residual = exact.iter().map(|c| c.residual).fold(0.0, f64::max);
+                assert!(residual < 1e-12, "{solver:?}, {name}, {views}, {count}: {residual:e}");
+            }
+        }
+    }
+    for length in [0.0, 5e-324, 1e-160, 1e160, f64::INFINITY, f64::NAN] {
+        assert!(Correspondence::from_bearings([0.0, length, 0.0], [0.0, 0.0, 1.0]).is_err(), "{length:e}");
+    }
+}
+
 /// Whether all solvers return the rotation alone, and count the points in front of camera 2.
 fn is_named_pure_rotation(one: &Scene) -> bool {
     let in_front = one.points2().filter(|x2| x2.z > 0.0).count();

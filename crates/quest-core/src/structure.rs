@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::smallest_eigenvector_3;
-use crate::algebra::two::{Two, TwoVectors, both, count, cross, dot, side_by_side, times};
+use crate::algebra::two::{Two, TwoVectors, both, cross, dot, side_by_side, times};
 use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
 
@@ -53,7 +53,7 @@ pub fn with_depths(
     matches: &[Correspondence],
 ) -> Completed {
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    let (mut squares, mut tally) = (0.0, Tally::default());
+    let (mut squares, mut tally) = (Two::ZERO, Tally::default());
     for pair in matches.chunks(2) {
         let (rays, _) = Rays::new(pair, &r_21, direction);
         squares += rays.sampson_squares(direction);
@@ -69,7 +69,7 @@ pub(crate) fn pair_with_depths(
     matches: &[Correspondence],
 ) -> [Completed; 2] {
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    let (mut squares, mut first, mut second) = (0.0, Tally::default(), Tally::default());
+    let (mut squares, mut first, mut second) = (Two::ZERO, Tally::default(), Tally::default());
     for pair in matches.chunks(2) {
         let (rays, b) = Rays::new(pair, &r_21, direction);
         squares += rays.sampson_squares(direction);
@@ -116,26 +116,26 @@ impl Rays {
         }
     }
 
-    /// The sum of the squared Sampson errors.
+    /// The squared Sampson errors.
     #[inline]
-    fn sampson_squares(&self, direction: &Vector3<f64>) -> f64 {
+    fn sampson_squares(&self, direction: &Vector3<f64>) -> Two {
         let (e, [tb, tc]) = (dot(&both(direction), &self.normal), self.along);
-        sampson_squares(e, tb, tc).reduce_add()
+        sampson_squares(e, tb, tc)
     }
 }
 
-/// What the matches say of the sign and the length of a translation.
+/// What the matches say of the sign and the length of a translation: sums over those on either side.
 #[derive(Clone, Copy, Default)]
 struct Tally {
-    front: usize,
-    behind: usize,
+    front: Two,
+    behind: Two,
     /// Matches whose rays are not parallel.
-    with_depth: usize,
+    with_depth: Two,
     /// Matches whose rays are parallel and point the same way.
-    at_infinity: usize,
+    at_infinity: Two,
     /// The sum of the depths, each before its division, and that of their absolute values.
-    signed: f64,
-    absolute: f64,
+    signed: Two,
+    absolute: Two,
 }
 
 impl Tally {
@@ -148,35 +148,42 @@ impl Tally {
         let lengths = |of: fn(&Correspondence) -> f64| Two::new([of(&pair[0]), pair.get(1).map_or(1.0, of)]);
         let (length1, length2) = (lengths(Correspondence::length1), lengths(Correspondence::length2));
         let depths = (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
+        let (zero, one) = (Two::ZERO, Two::splat(1.0));
         let is_apart = square.simd_gt(Two::splat(PARALLEL * PARALLEL));
-        let above = [area1, area2].map(|area| area.simd_gt(Two::ZERO));
-        let below = [area1, area2].map(|area| area.simd_lt(Two::ZERO));
-        self.with_depth += count(is_apart);
-        self.front += count(is_apart & above[0] & above[1]);
-        self.behind += count(is_apart & below[0] & below[1]);
-        self.at_infinity += count(!is_apart & cosine.simd_gt(Two::ZERO));
-        self.signed += (is_apart & (area1 + area2)).reduce_add();
-        self.absolute += (is_apart & depths).reduce_add();
+        self.with_depth += is_apart & one;
+        self.front += is_apart & area1.simd_gt(zero) & area2.simd_gt(zero) & one;
+        self.behind += is_apart & area1.simd_lt(zero) & area2.simd_lt(zero) & one;
+        self.at_infinity += !is_apart & cosine.simd_gt(zero) & one;
+        self.signed += is_apart & (area1 + area2);
+        self.absolute += is_apart & depths;
     }
 
     fn completed(
         &self,
         q_21: UnitQuaternion<f64>,
         direction: &Vector3<f64>,
-        squares: f64,
+        squares: Two,
         matches: &[Correspondence],
     ) -> Completed {
-        if self.absolute == 0.0 {
+        let [front, behind, at_infinity] = [self.front, self.behind, self.at_infinity].map(count);
+        let absolute = self.absolute.reduce_add();
+        if absolute == 0.0 {
             let pose = RelativePose::new(q_21, Vector3::zeros());
-            return Completed { pose, in_front: self.at_infinity, residual: pose.residual(matches) };
+            return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
         }
-        let Self { front, behind, .. } = *self;
-        let flip = behind > front || (behind == front && self.signed < 0.0);
-        let length = 2.0 * self.with_depth as f64 / self.absolute;
+        let flip = behind > front || (behind == front && self.signed.reduce_add() < 0.0);
+        let length = 2.0 * self.with_depth.reduce_add() / absolute;
         let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
-        let residual = (squares / matches.len() as f64).sqrt();
-        Completed { pose, in_front: self.at_infinity + if flip { behind } else { front }, residual }
+        let residual = (squares.reduce_add() / matches.len() as f64).sqrt();
+        Completed { pose, in_front: at_infinity + if flip { behind } else { front }, residual }
     }
+}
+
+/// The number that two counts make.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of matches")]
+#[inline]
+fn count(both: Two) -> usize {
+    both.reduce_add() as usize
 }
 
 #[cfg(test)]

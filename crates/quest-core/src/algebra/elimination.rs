@@ -2,46 +2,58 @@
 
 use nalgebra::ComplexField;
 
+use super::two::Two;
+
 /// Brings the first `R` columns of an `R × C` matrix to the identity, by row operations with partial
 /// pivoting, for the rows from `keep` on; the rows above are spent on the way and left as they are.
 ///
 /// Of the rows that are kept only the columns from `R` on are valid afterwards. Returns the smallest pivot over
 /// the largest one: zero where the matrix is singular, and then nothing is valid.
 pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep: usize) -> f64 {
+    const { assert!(R <= 64) }
     let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
     for k in 0..R {
-        let pivot = (k..R).fold(k, |best, i| if a[i][k].abs() > a[best][k].abs() { i } else { best });
+        // The bits of absolute values are ordered as these are; in place of the last six stands the row.
+        let key = |i: usize| (a[i][k].abs().to_bits() & !63) | i as u64;
+        let pivot = ((k..R).map(key).fold(0, u64::max) & 63) as usize;
         let size = a[pivot][k].abs();
         smallest = smallest.min(size);
         largest = largest.max(size);
         if size == 0.0 || size.is_nan() {
             return 0.0;
         }
-        swap_rows(a, k, pivot);
-        let inverse = 1.0 / a[k][k];
-        for x in &mut a[k][k + 1..] {
-            *x *= inverse;
+        // Whole rows: what stands left of column k is not read again, and loops of fixed length vectorise.
+        let inverse = 1.0 / a[pivot][k];
+        let row = a[pivot].map(|x| x * inverse);
+        for i in k + 1..R {
+            // Row k takes the place of the pivot's.
+            let from = if i == pivot { k } else { i };
+            a[i] = difference(&a[from], a[from][k], &row);
         }
-        let (upper, lower) = a.split_at_mut(k + 1);
-        let pivot_row = &upper[k];
-        for row in lower {
-            let factor = row[k];
-            for j in k + 1..C {
-                row[j] -= factor * pivot_row[j];
-            }
-        }
+        a[k] = row;
     }
     for k in (keep + 1..R).rev() {
-        let (upper, lower) = a.split_at_mut(k);
-        let pivot_row = &lower[0];
-        for row in &mut upper[keep..] {
-            let factor = row[k];
-            for j in R..C {
-                row[j] -= factor * pivot_row[j];
-            }
+        let row = a[k];
+        for other in &mut a[keep..k] {
+            *other = difference(other, other[k], &row);
         }
     }
     smallest / largest
+}
+
+/// `row − factor · other`.
+#[inline]
+fn difference<const C: usize>(row: &[f64; C], factor: f64, other: &[f64; C]) -> [f64; C] {
+    let mut out = [0.0; C];
+    let (blocks, rest) = out.as_chunks_mut::<2>();
+    let ((x, x_rest), (y, y_rest)) = (row.as_chunks::<2>(), other.as_chunks::<2>());
+    for ((out, x), y) in blocks.iter_mut().zip(x).zip(y) {
+        *out = (Two::new(*x) - Two::new(*y) * factor).to_array();
+    }
+    for ((out, x), y) in rest.iter_mut().zip(x_rest).zip(y_rest) {
+        *out = x - factor * y;
+    }
+    out
 }
 
 /// Eliminates the first `columns` columns by row operations with partial pivoting: below the first `columns` rows they
@@ -88,15 +100,6 @@ pub(crate) fn determinant<const N: usize>(a: &mut [[f64; N]; N]) -> f64 {
         }
     }
     product
-}
-
-/// Exchanges two rows, the second not above the first, entry by entry: three calls to copy memory take as long as a row of the
-/// elimination.
-#[inline]
-fn swap_rows<const R: usize, const C: usize>(a: &mut [[f64; C]; R], i: usize, j: usize) {
-    if let Some((other, [row, ..])) = a[i..=j].split_last_mut() {
-        row.swap_with_slice(other);
-    }
 }
 
 /// The null vector of a singular square matrix, scaled so that its last entry is one; `None` where the matrix

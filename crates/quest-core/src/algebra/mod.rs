@@ -9,8 +9,8 @@ pub(crate) mod elimination;
 
 pub(crate) mod monomials;
 pub(crate) mod null_space;
+pub(crate) mod number;
 pub(crate) mod polynomial;
 pub(crate) mod singular;
-pub(crate) mod square_root;
 pub(crate) mod symmetric;
 pub(crate) mod two;

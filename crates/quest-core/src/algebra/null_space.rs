@@ -1,9 +1,11 @@
 //! The null space of a wide matrix by Householder reflections.
 
+use super::two::Two;
+
 /// An orthonormal basis of the vectors orthogonal to the `R` rows of `a`, and the smallest pivot over the largest: how
 /// far the rows are from dependent.
 ///
-/// The longest remaining row is reflected first. `C = R + K`; `a` is overwritten.
+/// Rows that depend on those before leave nothing to reflect. `C = R + K`; `a` is overwritten.
 pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
     a: &mut [[f64; C]; R],
 ) -> ([[f64; C]; K], f64) {
@@ -11,26 +13,21 @@ pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
     let mut inverse = [0.0; R];
     let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
     for k in 0..R {
-        let (mut longest, mut square) = (k, -1.0);
-        for i in k..R {
-            let s: f64 = a[i][k..].iter().map(|x| x * x).sum();
-            if s > square {
-                (longest, square) = (i, s);
-            }
-        }
-        a.swap(k, longest);
-        let length = square.max(0.0).sqrt();
-        smallest = smallest.min(length);
-        largest = largest.max(length);
         // The row becomes the reflection's vector v, with I − v vᵀ · inverse, zero ahead of entry k: loops of fixed length
-        // are worth more than the products with these zeros.
+        // are worth more than the products with these zeros. No entry is written alone: what reads two would wait for it.
         let (head, tail) = a.split_at_mut(k + 1);
         let v = &mut head[k];
-        v[..k].fill(0.0);
+        for j in 0..C {
+            v[j] *= Entries::<R, C>::FROM[k][j];
+        }
+        let length = dot(v, v).sqrt();
+        smallest = smallest.min(length);
+        largest = largest.max(length);
         let image = -length.copysign(v[k]);
-        let first = v[k] - image;
-        v[k] = first;
-        inverse[k] = if length > 0.0 { -1.0 / (image * first) } else { 0.0 };
+        inverse[k] = if length > 0.0 { 1.0 / (length * length - image * v[k]) } else { 0.0 };
+        for j in 0..C {
+            v[j] -= image * Entries::<R, C>::ONLY[k][j];
+        }
         for row in tail {
             reflect(row, v, inverse[k]);
         }
@@ -45,18 +42,47 @@ pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
     (basis, if largest > 0.0 { smallest / largest } else { 0.0 })
 }
 
+/// Ones for the entries from `k` on, and for entry `k` alone.
+struct Entries<const R: usize, const C: usize>;
+
+impl<const R: usize, const C: usize> Entries<R, C> {
+    const FROM: [[f64; C]; R] = Self::ones().0;
+    const ONLY: [[f64; C]; R] = Self::ones().1;
+
+    const fn ones() -> ([[f64; C]; R], [[f64; C]; R]) {
+        let (mut from, mut only) = ([[0.0; C]; R], [[0.0; C]; R]);
+        let mut k = 0;
+        while k < R {
+            only[k][k] = 1.0;
+            let mut j = k;
+            while j < C {
+                from[k][j] = 1.0;
+                j += 1;
+            }
+            k += 1;
+        }
+        (from, only)
+    }
+}
+
 /// Applies `I − v vᵀ · inverse`.
 #[inline]
 fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64) {
-    // Two sums, so that the additions need not wait for each other.
-    let mut sums = [0.0; 2];
-    for j in 0..C {
-        sums[j % 2] += v[j] * x[j];
-    }
-    let dot = (sums[0] + sums[1]) * inverse;
+    let dot = dot(x, v) * inverse;
     for j in 0..C {
         x[j] -= dot * v[j];
     }
+}
+
+#[inline]
+fn dot<const C: usize>(x: &[f64; C], y: &[f64; C]) -> f64 {
+    let ((xs, x_rest), (ys, y_rest)) = (x.as_chunks::<2>(), y.as_chunks::<2>());
+    // Two sums of two, so that the additions need not wait for each other.
+    let mut sums = [Two::ZERO; 2];
+    for (k, (x, y)) in xs.iter().zip(ys).enumerate() {
+        sums[k % 2] += Two::new(*x) * Two::new(*y);
+    }
+    x_rest.iter().zip(y_rest).map(|(x, y)| x * y).sum::<f64>() + (sums[0] + sums[1]).reduce_add()
 }
 
 #[cfg(test)]
@@ -64,10 +90,6 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    fn dot(x: &[f64; 9], y: &[f64; 9]) -> f64 {
-        x.iter().zip(y).map(|(a, b)| a * b).sum()
-    }
 
     #[test]
     fn basis_is_orthonormal_and_orthogonal_to_the_rows() {

@@ -40,13 +40,6 @@ pub(crate) fn times(m: &Matrix3<f64>, v: &TwoVectors) -> TwoVectors {
     from_fn(|i| Two::splat(m[(i, 0)]) * v[0] + Two::splat(m[(i, 1)]) * v[1] + Two::splat(m[(i, 2)]) * v[2])
 }
 
-/// In how many of the two a comparison holds.
-#[inline]
-pub(crate) fn count(mask: Two) -> usize {
-    let bits = mask.to_bitmask();
-    (bits & 1) as usize + (bits >> 1) as usize
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,7 +57,5 @@ mod tests {
             assert!((dot(&pair, &product).to_array()[lane] - v.dot(&(m * v))).abs() < 1e-14);
         }
         assert!(side_by_side(&x, None)[0].to_array()[1].abs() < 1e-300);
-        assert_eq!([0, 1, 2].map(|k| count(pair[k].simd_gt(Two::splat(0.5)))), [1, 1, 0]);
-        assert_eq!(count(pair[2].simd_gt(Two::splat(-2.0))), 2);
     }
 }

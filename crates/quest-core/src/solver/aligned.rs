@@ -12,9 +12,10 @@
 //! parallax, and so are `t` and `S` at the true motion: `R = R0` to first order in `p`, so that the symmetric part of
 //! `E = [t]× R R0ᵀ` is of order `p`.
 
-use nalgebra::{ComplexField, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::null_space::null_space;
+use crate::algebra::number::Number;
 use crate::alignment::{best_rotation, best_rotation_of_lines, nearly_best_rotation};
 use crate::degeneracy::diagnose;
 use crate::{Correspondence, Degeneracy};
@@ -78,13 +79,21 @@ impl Alignment {
     /// rules out most matches at little cost.
     pub(crate) fn of_pure_rotation(matches: &[Correspondence]) -> Option<Self> {
         let (first, rest) = matches.split_first()?;
-        // No bearing is off by more than all are in root sum of squares; two of them make an angle.
-        let tolerance = 2.0 * NO_PARALLAX * (matches.len() as f64).sqrt();
-        let angle_is_kept = |m: &Correspondence| {
-            let cosine1 = first.bearing1().dot(m.bearing1()).abs();
-            (cosine1 - first.bearing2().dot(m.bearing2()).abs()).abs() <= tolerance
-        };
-        rest.iter().all(angle_is_kept).then(|| Self::new(matches)).filter(Self::is_pure_rotation)
+        rest.iter()
+            .all(|m| angle_is_kept(first, m, matches.len()))
+            .then(|| Self::new(matches))
+            .filter(Self::is_pure_rotation)
+    }
+
+    /// Whether a rotation alone explains four of the matches, as where four points are at infinity. The fifth gives one
+    /// constraint on the direction of the translation, which leaves a whole circle of them.
+    pub(crate) fn all_but_one_turn(matches: &[Correspondence; 5]) -> bool {
+        let [m0, m1, m2, m3, m4] = *matches;
+        // Whichever is left out, one of these pairs stays.
+        (angle_is_kept(&m0, &m1, 2) || angle_is_kept(&m2, &m3, 2))
+            && [[m1, m2, m3, m4], [m0, m2, m3, m4], [m0, m1, m3, m4], [m0, m1, m2, m4], [m0, m1, m2, m3]]
+                .iter()
+                .any(|four| Self::of_pure_rotation(four).is_some())
     }
 
     /// Whether a rotation alone explains the matches to the last digit.
@@ -108,7 +117,7 @@ impl Alignment {
     #[inline]
     pub(crate) fn row(&self, b: &Vector3<f64>, c: &Vector3<f64>) -> Coordinates {
         let b = same_side(b, c);
-        let n = moment(&b, c) / self.parallax;
+        let n = moment(&b, c) * (1.0 / self.parallax);
         [
             n.x,
             n.y,
@@ -132,9 +141,9 @@ impl Alignment {
 
     /// The essential matrix with these coordinates, between the turned view 1 and view 2.
     #[inline]
-    pub(crate) fn essential<T: ComplexField<RealField = f64> + Copy>(&self, e: &[T; 9]) -> [[T; 3]; 3] {
+    pub(crate) fn essential<T: Number>(&self, e: &[T; 9]) -> [[T; 3]; 3] {
         let [tx, ty, tz, rest @ ..] = *e;
-        let [xx, yy, zz, xy, xz, yz] = rest.map(|s| s.scale(self.parallax));
+        let [xx, yy, zz, xy, xz, yz] = rest.map(|s| s.times(self.parallax));
         [[xx, xy - tz, xz + ty], [xy + tz, yy, yz - tx], [xz - ty, yz + tx, zz]]
     }
 
@@ -168,6 +177,15 @@ impl Alignment {
         let symmetric = Matrix3::new(2.0 * xx, xy, xz, xy, 2.0 * yy, yz, xz, yz, 2.0 * zz);
         (symmetric + n.cross_matrix()) * self.q0_21.to_rotation_matrix().into_inner()
     }
+}
+
+/// Whether the angle between the lines of two of `count` matches is the same in both views, as after a rotation.
+#[inline]
+fn angle_is_kept(first: &Correspondence, second: &Correspondence, count: usize) -> bool {
+    // No bearing is off by more than all are in root sum of squares; two of them make an angle.
+    let tolerance = 2.0 * NO_PARALLAX * (count as f64).sqrt();
+    let cosine1 = first.bearing1().dot(second.bearing1()).abs();
+    (cosine1 - first.bearing2().dot(second.bearing2()).abs()).abs() <= tolerance
 }
 
 /// `b` or `−b`, the one that points the same way as `c`.

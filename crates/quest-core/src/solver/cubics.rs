@@ -22,11 +22,11 @@
 //! ten cubics in `x, y, z` with `w = 1` are reduced to the six leading monomials that matter; three combinations of
 //! these are linear in `x` and `y`, with coefficients that are polynomials in `z`; their determinant has degree ten.
 
-use nalgebra::ComplexField;
-
 use super::aligned::Coordinates;
 use crate::algebra::elimination;
 use crate::algebra::monomials::{homogeneous, position, sum};
+use crate::algebra::number::Number;
+use crate::algebra::two::Two;
 
 /// Exponents of `(x, y, z, w)` of the ten quadratic monomials.
 const QUADRATIC: [[u8; 4]; 10] = homogeneous::<10>(2);
@@ -62,7 +62,7 @@ const FIRST_USED: usize = 4;
 const VARIABLES: [[u8; 4]; 4] = homogeneous::<4>(1);
 
 /// The quadratic monomial of two variables.
-const SQUARE: [[usize; 4]; 4] = {
+pub(crate) const SQUARE: [[usize; 4]; 4] = {
     let mut table = [[0; 4]; 4];
     let mut a = 0;
     while a < 16 {
@@ -73,7 +73,7 @@ const SQUARE: [[usize; 4]; 4] = {
 };
 
 /// The cubic monomial of a quadratic one and a variable.
-const PRODUCT: [[usize; 4]; 10] = {
+pub(crate) const PRODUCT: [[usize; 4]; 10] = {
     let mut table = [[0; 4]; 10];
     let mut a = 0;
     while a < 40 {
@@ -114,10 +114,11 @@ fn sum_of(a: &Quadratic, b: &Quadratic, c: &Quadratic) -> Quadratic {
 }
 
 #[inline]
-pub(crate) fn add_product(out: &mut Cubic, a: &Quadratic, b: &Linear) {
+pub(crate) fn add_product<T: Number>(out: &mut [T; 20], a: &[T; 10], b: &[T; 4]) {
     for i in 0..10 {
         for j in 0..4 {
-            out[PRODUCT[i][j]] += a[i] * b[j];
+            let place = &mut out[PRODUCT[i][j]];
+            *place = *place + a[i] * b[j];
         }
     }
 }
@@ -211,24 +212,59 @@ impl Forms {
 /// The ten divided cubics over [`CUBIC`].
 fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let forms = Forms::new(basis, p);
+    let Forms { t, s, e, .. } = &forms;
     let lambda = forms.lambda(p);
-    let mut out = [[0.0; 20]; 10];
-    for j in 0..3 {
-        // Entry j of −2 tᵀ S.
-        let mut row = [0.0; 10];
+    // −2 tᵀ S.
+    let row: [Quadratic; 3] = std::array::from_fn(|j| {
+        let mut entry = [0.0; 10];
         for m in 0..3 {
-            add_linear_product(&mut row, &scaled(&forms.t[m], -2.0), &forms.s[m][j]);
+            add_linear_product(&mut entry, &scaled(&t[m], -2.0), &s[m][j]);
         }
-        for i in 0..3 {
-            let cubic = &mut out[3 * i + j];
-            add_product(cubic, &row, &forms.t[i]);
-            for m in 0..3 {
-                add_product(cubic, &lambda[i.min(m)][i.max(m)], &forms.e[m][j]);
-            }
+        entry
+    });
+    let rows = upper_rows(&lambda);
+    matrix_of_cubics(
+        |i, j| [(&row[j], &t[i]), (rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
+        forms.tenth(),
+    )
+}
+
+/// The rows of a symmetric matrix that is given by its upper triangle.
+#[inline]
+pub(crate) fn upper_rows(m: &[[Quadratic; 3]; 3]) -> [[&Quadratic; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| &m[i.min(j)][i.max(j)]))
+}
+
+/// Entries of a 3 × 3 matrix that are computed side by side; the last one stands alone.
+const SIDE_BY_SIDE: [[(usize, usize); 2]; 4] =
+    [[(0, 0), (0, 1)], [(1, 0), (1, 1)], [(2, 0), (2, 1)], [(0, 2), (1, 2)]];
+
+/// The cubics of a 3 × 3 matrix row by row, each entry a sum of products, and a tenth behind them.
+#[inline]
+pub(crate) fn matrix_of_cubics<'a, const N: usize>(
+    terms: impl Fn(usize, usize) -> [(&'a Quadratic, &'a Linear); N],
+    tenth: Cubic,
+) -> [Cubic; 10] {
+    let mut out = [[0.0; 20]; 10];
+    for [(i, j), (k, l)] in SIDE_BY_SIDE {
+        let mut two = [Two::ZERO; 20];
+        for ((a, b), (c, d)) in terms(i, j).into_iter().zip(terms(k, l)) {
+            add_product(&mut two, &interleaved(a, c), &interleaved(b, d));
+        }
+        for (n, two) in two.into_iter().enumerate() {
+            [out[3 * i + j][n], out[3 * k + l][n]] = two.to_array();
         }
     }
-    out[9] = forms.tenth();
+    for (a, b) in terms(2, 2) {
+        add_product(&mut out[8], a, b);
+    }
+    out[9] = tenth;
     out
+}
+
+#[inline]
+fn interleaved<const N: usize>(x: &[f64; N], y: &[f64; N]) -> [Two; N] {
+    std::array::from_fn(|k| Two::new([x[k], y[k]]))
 }
 
 /// Three equations `X(z) x + Y(z) y + W(z) = 0`; coefficients from the constant up.
@@ -241,13 +277,13 @@ pub(crate) struct Resultant {
 impl Resultant {
     /// The three equations, and how far the elimination was from singular.
     pub(crate) fn new(basis: &[Coordinates; 4], p: f64) -> (Self, f64) {
-        Self::from_cubics(ten_cubics(basis, p))
+        Self::from_cubics(&mut ten_cubics(basis, p))
     }
 
-    /// The same for any ten cubics over [`CUBIC`] of an essential matrix.
+    /// The same for any ten cubics over [`CUBIC`] of an essential matrix; they are overwritten.
     #[inline]
-    pub(crate) fn from_cubics(mut cubics: [Cubic; 10]) -> (Self, f64) {
-        let pivot = elimination::reduce(&mut cubics, FIRST_USED);
+    pub(crate) fn from_cubics(cubics: &mut [Cubic; 10]) -> (Self, f64) {
+        let pivot = elimination::reduce(cubics, FIRST_USED);
         let mut out = Self { x: [[0.0; 4]; 3], y: [[0.0; 4]; 3], w: [[0.0; 5]; 3] };
         for r in 0..3 {
             // The row led by a monomial times z, less z times the row led by the monomial: no leader is left.
@@ -288,7 +324,8 @@ impl Resultant {
     }
 
     /// `(x, y, z, w)` at a root, up to scale: the null vector of the three equations.
-    pub(crate) fn point<T: ComplexField<RealField = f64> + Copy>(&self, z: T) -> [T; 4] {
+    #[inline]
+    pub(crate) fn point<T: Number>(&self, z: T) -> [T; 4] {
         let m: [[T; 3]; 3] =
             std::array::from_fn(|r| [horner(&self.x[r], z), horner(&self.y[r], z), horner(&self.w[r], z)]);
         let cross = |a: &[T; 3], b: &[T; 3]| -> [T; 3] {
@@ -297,35 +334,22 @@ impl Resultant {
                 a[i] * b[j] - a[j] * b[i]
             })
         };
-        let candidates = [cross(&m[0], &m[1]), cross(&m[1], &m[2]), cross(&m[2], &m[0])];
-        let size = |v: &[T; 3]| v.iter().map(|x| x.modulus_squared()).sum::<f64>();
-        let sizes = candidates.each_ref().map(size);
-        let largest = (1..3).fold(0, |best, k| if sizes[k] > sizes[best] { k } else { best });
-        let [x, y, w] = candidates[largest];
+        let two_of = T::longer(&cross(&m[0], &m[1]), &cross(&m[1], &m[2]));
+        let [x, y, w] = T::longer(&two_of, &cross(&m[2], &m[0]));
         [x, y, z * w, w]
     }
 }
 
 #[inline]
-fn horner<T: ComplexField<RealField = f64> + Copy, const N: usize>(p: &[f64; N], z: T) -> T {
-    let mut value = T::from_real(p[N - 1]);
-    for c in p[..N - 1].iter().rev() {
-        value = value * z + T::from_real(*c);
-    }
-    value
+fn horner<T: Number, const N: usize>(p: &[f64; N], z: T) -> T {
+    p[..N - 1].iter().rev().fold(T::real(p[N - 1]), |value, c| value * z + T::real(*c))
 }
 
 /// `x N1 + y N2 + z N3 + w N4`.
-pub(crate) fn combine<T: ComplexField<RealField = f64> + Copy>(
-    basis: &[Coordinates; 4],
-    point: &[T; 4],
-) -> [T; 9] {
+#[inline]
+pub(crate) fn combine<T: Number>(basis: &[Coordinates; 4], point: &[T; 4]) -> [T; 9] {
     std::array::from_fn(|k| {
-        let mut sum = T::zero();
-        for m in 0..4 {
-            sum += point[m].scale(basis[m][k]);
-        }
-        sum
+        (1..4).fold(point[0].times(basis[0][k]), |sum, m| sum + point[m].times(basis[m][k]))
     })
 }
 

@@ -10,24 +10,13 @@
 
 use nalgebra::{Complex, ComplexField};
 
-use crate::algebra::square_root::SquareRoot;
+use crate::algebra::number::Number;
 
 type Vector<T> = [T; 3];
 
 #[inline]
-fn cross<T: ComplexField + Copy>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+fn cross<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-#[inline]
-fn square_size<T: ComplexField<RealField = f64> + Copy, const N: usize>(v: &[T; N]) -> f64 {
-    v.iter().map(|x| x.modulus_squared()).sum()
-}
-
-/// The index of the largest of a few sizes.
-#[inline]
-fn largest<const N: usize>(sizes: &[f64; N]) -> usize {
-    (1..N).fold(0, |best, k| if sizes[k] > sizes[best] { k } else { best })
 }
 
 /// The quaternion of one of the two rotations, scalar first and of any scale, and the translation with `t·t = 1`, of an
@@ -35,52 +24,55 @@ fn largest<const N: usize>(sizes: &[f64; N]) -> usize {
 ///
 /// `None` for a matrix that is zero or not finite.
 #[inline]
-pub(crate) fn decompose<T: ComplexField<RealField = f64> + SquareRoot + Copy>(
-    e: &[Vector<T>; 3],
-) -> Option<([T; 4], Vector<T>)> {
-    let mut sum = T::zero();
+pub(crate) fn decompose<T: Number + ComplexField>(e: &[Vector<T>; 3]) -> Option<([T; 4], Vector<T>)> {
+    let (q, t) = decomposed(e);
+    q.iter().all(ComplexField::is_finite).then_some((q, t))
+}
+
+/// The same, not finite for a matrix that is zero or not finite.
+#[inline]
+pub(crate) fn decomposed<T: Number>(e: &[Vector<T>; 3]) -> ([T; 4], Vector<T>) {
+    let mut sum = T::real(0.0);
     for x in e.as_flattened() {
-        sum += *x * *x;
+        sum = sum + *x * *x;
     }
-    let scale = (T::from_real(2.0) / sum).square_root();
+    let scale = (T::real(2.0) / sum).square_root();
     let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j] * scale));
     let cofactors: [Vector<T>; 3] =
         std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
-    let longest = cofactors[largest(&cofactors.each_ref().map(square_size))];
+    let longest = T::longer(&T::longer(&cofactors[0], &cofactors[1]), &cofactors[2]);
     let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).square_root();
-    let inverse = T::one() / length;
+    let inverse = T::real(1.0) / length;
     let t = longest.map(|x| x * inverse);
     let r: [Vector<T>; 3] = std::array::from_fn(|j| {
         let turned = cross(&t, &columns[j]);
         std::array::from_fn(|i| cofactors[j][i] - turned[i])
     });
-    let q = quaternion(&r);
-    square_size(&q).is_finite().then_some((q, t))
+    (quaternion(&r), t)
 }
 
-/// The quaternion, of any scale, of an orthogonal matrix given by its columns: the row of `4 q qᵀ` with the
-/// largest diagonal entry.
+/// The quaternion, of any scale, of an orthogonal matrix given by its columns: the longest row of `4 q qᵀ`.
 #[inline]
-fn quaternion<T: ComplexField<RealField = f64> + Copy>(columns: &[Vector<T>; 3]) -> [T; 4] {
+fn quaternion<T: Number>(columns: &[Vector<T>; 3]) -> [T; 4] {
     let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = *columns;
-    let one = T::one();
-    let diagonal = [one + xx + yy + zz, one + xx - yy - zz, one - xx + yy - zz, one - xx - yy + zz];
+    let one = T::real(1.0);
     let (wx, wy, wz) = (zy - yz, xz - zx, yx - xy);
     let (sxy, sxz, syz) = (yx + xy, zx + xz, zy + yz);
-    match largest(&diagonal.map(ComplexField::modulus_squared)) {
-        0 => [diagonal[0], wx, wy, wz],
-        1 => [wx, diagonal[1], sxy, sxz],
-        2 => [wy, sxy, diagonal[2], syz],
-        _ => [wz, sxz, syz, diagonal[3]],
-    }
+    let rows = [
+        [one + xx + yy + zz, wx, wy, wz],
+        [wx, one + xx - yy - zz, sxy, sxz],
+        [wy, sxy, one - xx + yy - zz, syz],
+        [wz, sxz, syz, one - xx - yy + zz],
+    ];
+    T::longer(&T::longer(&rows[0], &rows[1]), &T::longer(&rows[2], &rows[3]))
 }
 
 /// The quaternion of the other rotation: `t ⊗ q`, with `t` a pure quaternion.
 #[inline]
-pub(crate) fn twisted<T: ComplexField + Copy>(q: &[T; 4], t: &Vector<T>) -> [T; 4] {
+pub(crate) fn twisted<T: Number>(q: &[T; 4], t: &Vector<T>) -> [T; 4] {
     let v = [q[1], q[2], q[3]];
     let turned = cross(t, &v);
-    let scalar = -(t[0] * v[0] + t[1] * v[1] + t[2] * v[2]);
+    let scalar = T::real(0.0) - (t[0] * v[0] + t[1] * v[1] + t[2] * v[2]);
     [scalar, q[0] * t[0] + turned[0], q[0] * t[1] + turned[1], q[0] * t[2] + turned[2]]
 }
 

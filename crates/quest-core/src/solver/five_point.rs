@@ -21,8 +21,8 @@ use super::aligned::{Alignment, DEPENDENT, GRAM_DEPENDENT};
 use super::cubics::combine;
 use super::essential::{decompose, real_part, twisted};
 use super::least_squares::{outer, principal_basis};
-use super::motion::{Motion, Outcome};
-use super::shortlist::{Shortlist, pure_rotation};
+use super::motion::Motion;
+use super::shortlist::{Shortlist, is_answered};
 use super::trace_cubics::Basis;
 use crate::algebra::null_space;
 use crate::degeneracy::diagnose;
@@ -39,12 +39,8 @@ pub(crate) fn solve(
     out: &mut Candidates,
     method: impl Fn(&mut Solutions) -> bool,
 ) {
-    out.clear();
-    if matches.len() < MIN_MATCHES {
-        return out.set_degeneracy(Degeneracy::TooFewMatches);
-    }
-    if let Some(alignment) = Alignment::of_pure_rotation(matches) {
-        return pure_rotation(&alignment, matches, out);
+    if is_answered(MIN_MATCHES, matches, out) {
+        return;
     }
     let basis = match null_space(matches) {
         Err(degeneracy) => return out.set_degeneracy(degeneracy),
@@ -177,9 +173,8 @@ impl Solutions<'_> {
             && motion.largest_sine(five) > PRECISE
         {
             let aligned = Alignment::with_rotation(motion.q_21, five);
-            if motion.solve_five(&aligned, five) == Outcome::Stalled {
-                return false;
-            }
+            let Some(solution) = motion.solution(&aligned, five) else { return false };
+            motion = solution;
         }
         let before = self.shortlist.count(CandidateKind::Exact);
         self.shortlist.push_pair(CandidateKind::Exact, motion);

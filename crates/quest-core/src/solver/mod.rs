@@ -2,7 +2,7 @@
 
 mod aligned;
 mod consensus;
-mod cubics;
+pub(crate) mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
 mod five_point;
@@ -18,6 +18,7 @@ mod moments;
 pub(crate) mod motion;
 pub mod nister;
 mod normalisation;
+mod one_line;
 pub mod quest;
 pub mod quest_eigen;
 mod refining;
@@ -26,6 +27,7 @@ pub(crate) mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
 mod twenty;
+mod two_motions;
 
 use std::str::FromStr;
 

@@ -12,10 +12,10 @@
 use nalgebra::{Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 
 use super::aligned::Alignment;
+use super::two_motions::TwoMotions;
 use crate::Correspondence;
-use crate::algebra::elimination;
-use crate::algebra::two::{Two, TwoVectors, both, cross, dot, side_by_side, times};
-use crate::epipolar_frame::{EpipolarFrame, tangent_basis};
+use crate::algebra::two::{Two, TwoVectors, side_by_side};
+use crate::epipolar_frame::EpipolarFrame;
 use crate::pose::{RIGHT_ANGLE, sampson_square};
 
 /// A step shorter than this (radians) is rounding.
@@ -25,9 +25,6 @@ const CONVERGED: f64 = 1e-13;
 /// this.
 const WITHIN_NOISE: f64 = 1e-3;
 
-/// Newton's iteration takes one or two; a double root takes them all.
-const MAX_NEWTON_STEPS: usize = 10;
-
 /// A relative pose without the length of its translation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
@@ -35,15 +32,6 @@ pub(crate) struct Motion {
     pub(crate) q_21: UnitQuaternion<f64>,
     /// The direction of the translation, a unit vector of either sign.
     pub(crate) direction: Vector3<f64>,
-}
-
-/// How an iteration ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
-    /// The last step was rounding.
-    Converged,
-    /// The steps ran out, or led away.
-    Stalled,
 }
 
 impl Motion {
@@ -121,41 +109,10 @@ impl Motion {
         sines.into_iter().fold(0.0, f64::max)
     }
 
-    /// Newton's iteration to the solution of five constraints.
-    ///
-    /// Not in the epipolar frame: its rounding would be that of the constraints, and with a parallax of 1e-8 shows.
-    pub(crate) fn solve_five(&mut self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Outcome {
-        let resolution = alignment.direction_resolution();
-        for _ in 0..MAX_NEWTON_STEPS {
-            let tangent = tangent_basis(&self.direction);
-            let r_21 = self.q_21.to_rotation_matrix().into_inner();
-            let [t, e1, e2] = [&self.direction, &tangent[0], &tangent[1]].map(both);
-            let mut equations = [[0.0; 6]; 5];
-            for (rows, pair) in equations.chunks_mut(2).zip(matches.chunks(2)) {
-                let second = pair.get(1);
-                let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
-                let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
-                let c = times(&r_21, &a);
-                let (n, bc, tc) = (cross(&b, &c), dot(&b, &c), dot(&t, &c));
-                let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
-                let entries = [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), -dot(&n, &t)];
-                let entries = entries.map(Two::to_array);
-                for (lane, row) in rows.iter_mut().enumerate() {
-                    *row = entries.map(|entry| entry[lane]);
-                }
-            }
-            let Some(step) = elimination::solve(&mut equations) else { return Outcome::Stalled };
-            let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if length > 1.0 {
-                return Outcome::Stalled;
-            }
-            *self = self.stepped(&tangent, &step);
-            // Quadratic: the error left is the square of the step.
-            if length < resolution.max(1e-7) {
-                return Outcome::Converged;
-            }
-        }
-        Outcome::Stalled
+    /// The solution of five constraints that Newton's iteration leads to; `None` where it does not converge.
+    pub(crate) fn solution(&self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Option<Self> {
+        let [solution, _] = TwoMotions::same(self).solutions(alignment, matches);
+        solution
     }
 
     /// Levenberg–Marquardt to a local minimum of the summed squares of the Sampson errors. Matches further than `cutoff`

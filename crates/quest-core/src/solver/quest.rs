@@ -22,7 +22,7 @@
 //!
 //! The parallax-safe form is this project's; the elimination to degree ten is Nistér's (PAMI 2004).
 
-use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Complex, Quaternion, UnitQuaternion};
 
 use super::aligned::{Alignment, Coordinates};
 use super::cubics::{Resultant, combine};
@@ -30,8 +30,10 @@ use super::essential::{decompose, real_part, twisted};
 use super::gram::Gram;
 use super::motion::Motion;
 use super::shortlist::Shortlist;
+use super::two_motions::TwoMotions;
 use super::{Kinds, PoseSolver, refining};
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
+use crate::algebra::two::Two;
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
@@ -51,18 +53,18 @@ impl PoseSolver for Quest {
     }
 }
 
-/// The solutions of five matches.
+/// Adds the solutions of five matches.
 fn from_five(
     kinds: Kinds,
     alignment: &Alignment,
     matches: &[Correspondence; 5],
-) -> Result<Shortlist, Degeneracy> {
+    shortlist: &mut Shortlist,
+) -> Result<(), Degeneracy> {
     let mut basis = alignment.null_space(matches)?;
-    let mut shortlist = Shortlist::new();
     for mixing in MIXINGS {
         shortlist.retain(CandidateKind::Exact);
         let roots = Roots::new(&basis, alignment);
-        let complete = roots.real(|motion| shortlist.push_solution(motion, alignment, matches).is_some());
+        let complete = roots.real(|two, count| shortlist.push_solutions(two, count, alignment, matches));
         if kinds == Kinds::All {
             roots.complex(|q_21, nearly_real| {
                 let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
@@ -79,7 +81,7 @@ fn from_five(
         }
         basis = mixed(&basis, &mixing);
     }
-    Ok(shortlist)
+    Ok(())
 }
 
 /// The solutions of the five constraints that stand for all matches.
@@ -88,9 +90,11 @@ fn starts(gram: &Gram, [.., n1, n2, n3, n4]: &[Coordinates; 9]) -> Shortlist {
     let mut starts = Shortlist::new();
     for mixing in MIXINGS {
         let roots = Roots::new(&basis, &gram.alignment);
-        let complete = roots.real(|motion| {
-            starts.push_pair(CandidateKind::Exact, motion);
-            true
+        let complete = roots.real(|two, count| {
+            let motions = two.apart().into_iter().take(count);
+            motions
+                .map(|motion| motion.map(|motion| starts.push_pair(CandidateKind::Exact, motion)))
+                .all(|m| m.is_some())
         });
         roots.complex(|q_21, _| {
             let direction = gram.direction(&q_21);
@@ -110,14 +114,16 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
     if alignment.is_pure_rotation() {
         return None;
     }
-    from_five(Kinds::Exact, &alignment, matches).ok()
+    let mut shortlist = Shortlist::new();
+    from_five(Kinds::Exact, &alignment, matches, &mut shortlist).ok().map(|()| shortlist)
 }
 
 /// A double root is known to the square root of rounding; times what the elimination loses.
 const NEARLY_REAL: f64 = 1e-4;
 
-/// An elimination that comes this close to singular has lost half of its digits.
-const SMALL_PIVOT: f64 = 1e-8;
+/// An elimination that comes this close to singular has lost five digits; clusters of roots lose the others. One noisy problem in
+/// five hundred is.
+const SMALL_PIVOT: f64 = 2e-5;
 
 /// Orthogonal changes of the null space's basis, for another attempt where the first did badly: the last
 /// basis vector may be absent from a solution, which puts its root at infinity.
@@ -148,17 +154,15 @@ impl<'a> Roots<'a> {
         Self { basis, alignment, resultant, polynomial, real }
     }
 
-    /// Hands over the motion of each real root, with one of its two rotations. Whether every root was found and `accept`
-    /// took its motion.
-    fn real(&self, mut accept: impl FnMut(Motion) -> bool) -> bool {
+    /// Hands over the motions of the real roots, with one of the two rotations of each: two at a time, and how many of them
+    /// count. Whether every root was found and `accept` took all its motions.
+    fn real(&self, mut accept: impl FnMut(&TwoMotions, usize) -> bool) -> bool {
         let mut complete = self.real.certain;
-        for &z in self.real.as_slice() {
+        for roots in self.real.as_slice().chunks(2) {
+            let z = Two::new([roots[0], roots[roots.len() - 1]]);
             let coordinates = combine(self.basis, &self.resultant.point(z));
-            let motion = decompose(&self.alignment.essential(&coordinates)).map(|(q, t)| Motion {
-                q_21: unit(q) * self.alignment.q0_21,
-                direction: Vector3::from(t).normalize(),
-            });
-            complete &= motion.is_some_and(&mut accept);
+            let motions = TwoMotions::of_essential(&self.alignment.essential(&coordinates));
+            complete &= accept(&motions.after(&self.alignment.q0_21), roots.len());
         }
         complete
     }

@@ -11,7 +11,7 @@
 use super::aligned::{Alignment, Coordinates};
 use super::gram::Gram;
 use super::shortlist::{Shortlist, pure_rotation, rotation_only};
-use super::{Kinds, consensus};
+use super::{Kinds, consensus, one_line};
 use crate::structure::translation_direction;
 use crate::{Candidates, Correspondence, Degeneracy};
 
@@ -26,7 +26,7 @@ pub(crate) fn solve(
     kinds: Kinds,
     matches: &[Correspondence],
     out: &mut Candidates,
-    from_five: impl FnOnce(Kinds, &Alignment, &[Correspondence; 5]) -> Result<Shortlist, Degeneracy>,
+    from_five: impl FnOnce(Kinds, &Alignment, &[Correspondence; 5], &mut Shortlist) -> Result<(), Degeneracy>,
     starts: impl FnOnce(&Gram, &[Coordinates; 9]) -> Shortlist,
 ) {
     out.clear();
@@ -38,9 +38,20 @@ pub(crate) fn solve(
     if alignment.is_pure_rotation() {
         return pure_rotation(&alignment, matches, out);
     }
-    match from_five(kinds, &alignment, five) {
+    if Alignment::all_but_one_turn(five) {
+        return out.set_degeneracy(Degeneracy::RankDeficient);
+    }
+    let mut shortlist = Shortlist::new();
+    let found = match one_line::essential_matrices(five) {
+        Some(pair) => {
+            shortlist.push_essential(&pair, &alignment, five);
+            Ok(())
+        }
+        None => from_five(kinds, &alignment, five, &mut shortlist),
+    };
+    match found {
         Err(degeneracy) => out.set_degeneracy(degeneracy),
-        Ok(shortlist) => {
+        Ok(()) => {
             if kinds == Kinds::All {
                 let q0_21 = alignment.q0_21;
                 out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));

@@ -1,11 +1,13 @@
 //! From the rotations that a solver finds to the ranked list of candidates: what all solvers share.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
-use super::motion::{Motion, Outcome};
+use super::motion::Motion;
+use super::two_motions::TwoMotions;
+use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
 use crate::structure::{Completed, pair_with_depths, with_depths};
@@ -116,14 +118,16 @@ impl Shortlist {
         if self.iter().any(|old| !replaces(old) && old.covers(new, same)) {
             return;
         }
-        self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
+        if self.iter().any(replaces) {
+            self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
+        }
         if let Some(place) = self.items.get_mut(self.len) {
             *place = *new;
             self.len += 1;
         }
     }
 
-    /// Adds the solution of five constraints near `motion`, and the twisted one beside it; a start from which
+    /// Adds the solution of five constraints near `start`, and the twisted one beside it; a start from which
     /// Newton's iteration does not converge is kept as it is, and reported as `None`: it stands for a
     /// complex solution that happens to be nearly real.
     pub(crate) fn push_solution(
@@ -132,16 +136,43 @@ impl Shortlist {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> Option<Motion> {
-        let mut motion = start;
-        match motion.solve_five(alignment, matches) {
-            Outcome::Converged => {
-                self.push_pair(CandidateKind::Exact, motion);
-                Some(motion)
-            }
-            Outcome::Stalled => {
+        let solution = start.solution(alignment, matches);
+        match solution {
+            Some(motion) => self.push_pair(CandidateKind::Exact, motion),
+            None => self.push(CandidateKind::FromComplex, start),
+        }
+        solution
+    }
+
+    /// The same for the first `count` of two starts. Whether all of them led to a solution.
+    pub(crate) fn push_solutions(
+        &mut self,
+        starts: &TwoMotions,
+        count: usize,
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) -> bool {
+        let solutions = starts.solutions(alignment, matches);
+        for (k, solution) in solutions.iter().enumerate().take(count) {
+            if let Some(motion) = solution {
+                self.push_pair(CandidateKind::Exact, *motion);
+            } else if let Some(start) = starts.apart()[k] {
                 self.push(CandidateKind::FromComplex, start);
-                None
             }
+        }
+        solutions[..count].iter().all(Option::is_some)
+    }
+
+    /// Adds the solutions near two real essential matrices.
+    pub(crate) fn push_essential(
+        &mut self,
+        pair: &[Matrix3<f64>; 2],
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) {
+        let two = std::array::from_fn(|i| std::array::from_fn(|j| Two::new(pair.map(|e| e[(i, j)]))));
+        for solution in TwoMotions::of_essential(&two).solutions(alignment, matches).into_iter().flatten() {
+            self.push_pair(CandidateKind::Exact, solution);
         }
     }
 
@@ -214,6 +245,22 @@ pub(crate) fn rotation_only(
     candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
+/// Empties `out` and answers too few matches and exact pure rotations, which no solver needs to look at; whether it did.
+pub(crate) fn is_answered(least: usize, matches: &[Correspondence], out: &mut Candidates) -> bool {
+    out.clear();
+    if matches.len() < least {
+        out.set_degeneracy(Degeneracy::TooFewMatches);
+        return true;
+    }
+    match Alignment::of_pure_rotation(matches) {
+        None => false,
+        Some(alignment) => {
+            pure_rotation(&alignment, matches, out);
+            true
+        }
+    }
+}
+
 /// The one candidate of an exact pure rotation, unless the matches leave that undetermined too.
 pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], out: &mut Candidates) {
     if all_parallel(matches) {
@@ -228,19 +275,24 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
 pub(crate) fn rank(out: &mut Candidates) {
-    // Positive numbers are ordered as their bits are: keys are compared as integers, and candidates moved once.
-    let key = |(k, c): (usize, &Candidate)| {
+    // Positive numbers are ordered as their bits are: keys are compared as integers, without branches.
+    let mut keys = [[0; 3]; Candidates::CAPACITY];
+    for (key, c) in keys.iter_mut().zip(out.iter()) {
         let residual = c.residual.max(ROUNDING).to_bits();
-        (usize::MAX - c.in_front, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits(), k)
-    };
-    let mut order = [(0, 0, 0, 0); Candidates::CAPACITY];
-    let order = &mut order[..out.len()];
-    for (place, candidate) in order.iter_mut().zip(out.iter().enumerate()) {
-        *place = key(candidate);
+        *key = [u64::MAX - c.in_front as u64, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits()];
     }
-    order.sort_unstable();
+    let keys = &keys[..out.len()];
+    let mut places = [0; Candidates::CAPACITY];
+    for (i, x) in keys.iter().enumerate() {
+        for (j, y) in keys[..i].iter().enumerate() {
+            let comes_first =
+                (x[0] < y[0]) | ((x[0] == y[0]) & ((x[1] < y[1]) | ((x[1] == y[1]) & (x[2] < y[2]))));
+            places[i] += usize::from(!comes_first);
+            places[j] += usize::from(comes_first);
+        }
+    }
     let unordered = out.clone();
-    for (place, (.., k)) in out.as_mut_slice().iter_mut().zip(order) {
-        *place = unordered[*k];
+    for (candidate, place) in unordered.iter().zip(places) {
+        out.as_mut_slice()[place] = *candidate;
     }
 }

@@ -10,7 +10,9 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::cubics::{Cubic, Linear, Quadratic, add_linear_product, add_product, scaled};
+use super::cubics::{
+    Cubic, Linear, Quadratic, add_linear_product, add_product, matrix_of_cubics, scaled, upper_rows,
+};
 
 /// Four essential matrices, row by row.
 pub(crate) type Basis = [[f64; 9]; 4];
@@ -20,16 +22,11 @@ pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
     let e: [[Linear; 3]; 3] =
         std::array::from_fn(|i| std::array::from_fn(|j| std::array::from_fn(|m| basis[m][3 * i + j])));
     let product = half_traceless_square(&e);
-    let mut out = [[0.0; 20]; 10];
-    for i in 0..3 {
-        for j in 0..3 {
-            for m in 0..3 {
-                add_product(&mut out[3 * i + j], &product[i.min(m)][i.max(m)], &e[m][j]);
-            }
-        }
-    }
-    out[9] = determinant(&e);
-    out
+    let rows = upper_rows(&product);
+    matrix_of_cubics(
+        |i, j| [(rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
+        determinant(&e),
+    )
 }
 
 /// `E Eᵀ − ½ tr(E Eᵀ) I`, by its upper triangle.

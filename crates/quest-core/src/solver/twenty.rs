@@ -97,24 +97,24 @@ pub(crate) trait TwentySolutions: Sized {
     }
 }
 
-/// The solutions of five matches.
+/// Adds the solutions of five matches.
 pub(crate) fn from_five<S: TwentySolutions>(
     kinds: Kinds,
     alignment: &Alignment,
     matches: &[Correspondence; 5],
-) -> Result<Shortlist, Degeneracy> {
+    shortlist: &mut Shortlist,
+) -> Result<(), Degeneracy> {
     alignment.null_space(matches)?;
-    let mut shortlist = Shortlist::new();
     for g in pre_rotations() {
         let turned = matches.map(|m| m.with_view2_rotated(&g));
         let m = turned.map(|m| bilinear(&(m.bearing2() * m.bearing1().transpose())));
         let Some(spectrum) = S::new(&ten_quartics(&turned), &minors_without_q(&m)) else { continue };
         shortlist.retain(CandidateKind::Exact);
-        if spectrum.collect(kinds, &g, alignment, matches, &mut shortlist) {
+        if spectrum.collect(kinds, &g, alignment, matches, shortlist) {
             break;
         }
     }
-    Ok(shortlist)
+    Ok(())
 }
 
 /// The real eigenvalue that is `wanted`, as far as eigenvalues are precise.

@@ -1,0 +1,267 @@
+//! Two motions side by side, from two essential matrices to two solutions of the same five matches.
+//!
+//! Each step of one motion waits for the step before; those of two do not wait for each other. Where one takes a branch, two
+//! compute both sides and select.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use super::aligned::Alignment;
+use super::essential::decomposed;
+use super::motion::Motion;
+use crate::Correspondence;
+use crate::algebra::two::{Two, TwoVectors, both, cross, dot};
+
+/// Newton's iteration takes one or two steps; a double root takes them all.
+const MAX_NEWTON_STEPS: usize = 10;
+
+/// The squares of five constraints whose unit bearings are rounded, with a margin.
+const ROUNDING: f64 = 1e-30;
+
+/// Quaternions, scalar first.
+type TwoQuaternions = [Two; 4];
+
+/// Two relative poses without the length of their translations.
+#[derive(Clone, Copy)]
+pub(crate) struct TwoMotions {
+    q_21: TwoQuaternions,
+    direction: TwoVectors,
+}
+
+impl TwoMotions {
+    /// The same motion twice.
+    pub(crate) fn same(motion: &Motion) -> Self {
+        let q = motion.q_21.quaternion();
+        Self { q_21: [q.w, q.i, q.j, q.k].map(Two::splat), direction: both(&motion.direction) }
+    }
+
+    /// One of the two motions of each essential matrix of any scale, row by row; not finite for a matrix that is zero or not
+    /// finite.
+    #[inline]
+    pub(crate) fn of_essential(e: &[TwoVectors; 3]) -> Self {
+        let (q_21, direction) = decomposed(e);
+        Self { q_21: normalized(&q_21), direction }
+    }
+
+    /// After another rotation `q0_21`: `R ← R R0`.
+    #[inline]
+    pub(crate) fn after(&self, q0_21: &UnitQuaternion<f64>) -> Self {
+        let q0 = q0_21.quaternion();
+        let q0 = [q0.w, q0.i, q0.j, q0.k].map(Two::splat);
+        Self { q_21: product(&self.q_21, &q0), ..*self }
+    }
+
+    /// The motions; `None` for one that is not finite.
+    #[inline]
+    pub(crate) fn apart(&self) -> [Option<Motion>; 2] {
+        let ([w, x, y, z], [tx, ty, tz]) = (self.q_21.map(Two::to_array), self.direction.map(Two::to_array));
+        std::array::from_fn(|k| {
+            let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w[k], x[k], y[k], z[k]));
+            let direction = Vector3::new(tx[k], ty[k], tz[k]);
+            let sum = q_21.coords.sum() + direction.sum();
+            sum.is_finite().then_some(Motion { q_21, direction })
+        })
+    }
+
+    /// The solutions of five constraints that Newton's iteration leads to; `None` where it does not converge.
+    ///
+    /// Not in the epipolar frame: its rounding would be that of the constraints, and with a parallax of 1e-8 shows.
+    pub(crate) fn solutions(
+        &self,
+        alignment: &Alignment,
+        matches: &[Correspondence; 5],
+    ) -> [Option<Motion>; 2] {
+        let limit = alignment.direction_resolution().max(1e-7).powi(2);
+        let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
+        let mut before = Two::splat(f64::INFINITY);
+        for _ in 0..MAX_NEWTON_STEPS {
+            let Step { next, square, residual } = motions.stepped(matches);
+            // Not a number is no step either.
+            let is_step = square.simd_le(Two::splat(1.0));
+            motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
+            motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
+            // Quadratic: the error left is the square of the step. Near another solution the steps of rounding are longer, and
+            // come to no end.
+            let is_rounding = square.simd_gt(before * 0.25) & residual.simd_lt(Two::splat(ROUNDING));
+            has_converged |= (square.simd_lt(Two::splat(limit)) | is_rounding) & !is_over;
+            before = square;
+            is_over |= has_converged | !is_step;
+            if is_over.all() {
+                break;
+            }
+        }
+        let ([first, second], converged) = (motions.apart(), has_converged.to_bitmask());
+        [first.filter(|_| converged & 1 != 0), second.filter(|_| converged & 2 != 0)]
+    }
+
+    #[inline]
+    fn stepped(&self, matches: &[Correspondence; 5]) -> Step {
+        let t = &self.direction;
+        let [e1, e2] = tangent_basis(t);
+        let r_21 = rotation(&self.q_21);
+        let equations = matches.each_ref().map(|m| {
+            let (a, b) = (both(m.bearing1()), both(m.bearing2()));
+            let c = r_21.map(|row| dot(&row, &a));
+            let (n, bc, tc) = (cross(&b, &c), dot(&b, &c), dot(t, &c));
+            let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
+            [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), -dot(&n, t)]
+        });
+        let residual = equations.iter().fold(Two::ZERO, |sum, row| sum + row[5] * row[5]);
+        let [w1, w2, w3, move1, move2] = solve(equations);
+        let square = w1 * w1 + w2 * w2 + w3 * w3 + move1 * move1 + move2 * move2;
+        // To first order a rotation by ω; any step of the iteration may differ from it to second order.
+        let turn = [Two::splat(1.0), w1 * 0.5, w2 * 0.5, w3 * 0.5];
+        let direction: TwoVectors = std::array::from_fn(|k| t[k] + (e1[k] * move1 + e2[k] * move2));
+        let next = Self { q_21: normalized(&product(&turn, &self.q_21)), direction: normalized(&direction) };
+        Step { next, square, residual }
+    }
+}
+
+/// A step of Newton's iteration.
+struct Step {
+    /// Where it leads.
+    next: TwoMotions,
+    /// Its squared length (radians).
+    square: Two,
+    /// The sum of the squared constraints before it.
+    residual: Two,
+}
+
+/// `x` where the mask is set, `y` elsewhere.
+#[inline]
+fn select<const N: usize>(mask: Two, x: &[Two; N], y: &[Two; N]) -> [Two; N] {
+    std::array::from_fn(|k| mask.select(x[k], y[k]))
+}
+
+#[inline]
+fn scaled<const N: usize>(x: &[Two; N], factor: Two) -> [Two; N] {
+    x.map(|x| x * factor)
+}
+
+#[inline]
+fn normalized<const N: usize>(x: &[Two; N]) -> [Two; N] {
+    let square = x.iter().fold(Two::ZERO, |sum, x| sum + *x * *x);
+    scaled(x, Two::splat(1.0) / square.sqrt())
+}
+
+/// `p ⊗ q`.
+#[inline]
+fn product(p: &TwoQuaternions, q: &TwoQuaternions) -> TwoQuaternions {
+    let ([a, b, c, d], [w, x, y, z]) = (*p, *q);
+    [
+        a * w - (b * x + c * y + d * z),
+        (a * x + b * w) + (c * z - d * y),
+        (a * y + c * w) + (d * x - b * z),
+        (a * z + d * w) + (b * y - c * x),
+    ]
+}
+
+/// The rotation matrices of unit quaternions, row by row.
+#[inline]
+fn rotation(q: &TwoQuaternions) -> [TwoVectors; 3] {
+    let [w, x, y, z] = *q;
+    let (x2, y2, z2, one) = (x + x, y + y, z + z, Two::splat(1.0));
+    let (xx, yy, zz) = (x * x2, y * y2, z * z2);
+    let (xy, xz, yz) = (x * y2, x * z2, y * z2);
+    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+    [
+        [one - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, one - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, one - (xx + yy)],
+    ]
+}
+
+/// Two unit vectors that complete each `t` to a right-handed frame (Duff et al., JCGT 2017).
+#[inline]
+fn tangent_basis(t: &TwoVectors) -> [TwoVectors; 2] {
+    let [x, y, z] = *t;
+    let one = Two::splat(1.0);
+    let sign = z.simd_lt(Two::ZERO).select(-one, one);
+    let a = -one / (sign + z);
+    let b = x * y * a;
+    [[one + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]]
+}
+
+/// The solutions of two times five equations, the right-hand sides last, by elimination with partial pivoting; not finite
+/// where they are singular.
+#[inline]
+fn solve(mut m: [[Two; 6]; 5]) -> [Two; 5] {
+    let mut x = [Two::ZERO; 5];
+    for k in 0..5 {
+        for i in k + 1..5 {
+            let is_larger = m[i][k].abs().simd_gt(m[k][k].abs());
+            for j in k..6 {
+                let exchanged = (m[i][j] ^ m[k][j]) & is_larger;
+                m[i][j] = m[i][j] ^ exchanged;
+                m[k][j] = m[k][j] ^ exchanged;
+            }
+        }
+        // Kept for the way back.
+        x[k] = Two::splat(1.0) / m[k][k];
+        for i in k + 1..5 {
+            let factor = m[i][k] * x[k];
+            for j in k + 1..6 {
+                m[i][j] -= factor * m[k][j];
+            }
+        }
+    }
+    for k in (0..5).rev() {
+        let mut sum = m[k][5];
+        for j in k + 1..5 {
+            sum -= m[k][j] * x[j];
+        }
+        x[k] *= sum;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::epipolar_frame;
+    use nalgebra::{SMatrix, SVector};
+
+    #[test]
+    fn frames_and_rotations_are_those_of_one() {
+        let motion = |x: f64, y: f64, z: f64| Motion {
+            q_21: UnitQuaternion::new(Vector3::new(x, 2.0 * y, -z)),
+            direction: Vector3::new(x, y, z).normalize(),
+        };
+        let motions = [motion(0.3, -0.2, 0.5), motion(-2.0, 1.0, -0.1)];
+        let essential = motions.map(|m| m.essential());
+        let e =
+            std::array::from_fn(|i| std::array::from_fn(|j| Two::new(essential.map(|e| 3.0 * e[(i, j)]))));
+        let turn = UnitQuaternion::new(Vector3::new(0.1, 0.7, -0.4));
+        let both = TwoMotions::of_essential(&e);
+        let after = both.after(&turn).apart();
+        let bases = tangent_basis(&both.direction);
+        for (k, (m, turned)) in motions.iter().zip(after).enumerate() {
+            let turned = turned.unwrap();
+            let found = Motion { q_21: turned.q_21 * turn.inverse(), ..turned };
+            assert!(found.is_close(m, 1e-7) || found.twisted().is_close(m, 1e-7));
+            assert!((turned.q_21.norm() - 1.0).abs() < 1e-15);
+            let basis = epipolar_frame::tangent_basis(&turned.direction);
+            for (one, two) in basis.iter().zip(bases) {
+                assert!((0..3).all(|i| (one[i] - two[i].to_array()[k]).abs() < 1e-15));
+            }
+        }
+        assert!(TwoMotions::of_essential(&[[Two::ZERO; 3]; 3]).apart().iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn solve_agrees_with_nalgebra_and_shows_singular() {
+        let entry = |lane: usize, i: usize, j: usize| ((5 * i + 7 * j + 3 * lane) as f64 * 1.3 + 0.2).sin();
+        let two: [[Two; 6]; 5] =
+            std::array::from_fn(|i| std::array::from_fn(|j| Two::new([0, 1].map(|k| entry(k, i, j)))));
+        for lane in 0..2 {
+            let a = SMatrix::<f64, 5, 5>::from_fn(|i, j| entry(lane, i, j) + f64::from(u8::from(i == j)));
+            let mut shifted = two;
+            for (i, row) in shifted.iter_mut().enumerate() {
+                row[i] += Two::splat(1.0);
+            }
+            let expected = a.lu().solve(&SVector::<f64, 5>::from_fn(|i, _| entry(lane, i, 5))).unwrap();
+            let x = solve(shifted);
+            assert!((0..5).all(|k| (x[k].to_array()[lane] - expected[k]).abs() < 1e-12));
+        }
+        assert!(!solve([[Two::splat(1.0); 6]; 5])[0].to_array()[0].is_finite());
+    }
+}
