@@ -125,6 +125,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "a position on the canvas")]
     fn no_point_is_further_from_the_thinned_line_than_the_tolerance() {
         let wave = |k: i32| [8 * k, (400.0 * (0.1 * f64::from(k)).sin()).round() as i32];
         let points: Vec<_> = (0..500).map(wave).collect();
