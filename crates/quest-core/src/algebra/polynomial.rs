@@ -282,6 +282,7 @@ impl<const N: usize> Chain<N> {
     }
 
     /// A point beyond all roots on the side of `direction` (±1) from `end`; `None` where there are none.
+    #[expect(clippy::float_cmp, reason = "changes are counts")]
     fn bound(&self, direction: f64, end: End) -> Option<End> {
         // At ±∞ the leading terms decide: x, and the slopes of the recurrence.
         let mut at_infinity = u32::from((self.last_linear[1] * direction < 0.0) != (self.last < 0.0));
@@ -515,16 +516,16 @@ mod tests {
         // Of a noisy five-point problem. The leading terms of its first two members nearly cancel, and the chain counts two
         // of the four real roots, near −1.3224, −1.3032, 0.3016 and 0.7417.
         let p = [
-            20.41093749144269,
-            -11.526383629997055,
-            -145.59264007108558,
-            -176.15964871285013,
-            30.516545741724837,
-            256.73633710104735,
-            282.05320455352324,
-            164.1690412603802,
-            56.864489112105495,
-            11.24124154178988,
+            20.410_937_491_442_69,
+            -11.526_383_629_997_055,
+            -145.592_640_071_085_58,
+            -176.159_648_712_850_13,
+            30.516_545_741_724_837,
+            256.736_337_101_047_35,
+            282.053_204_553_523_24,
+            164.169_041_260_380_2,
+            56.864_489_112_105_495,
+            11.241_241_541_789_88,
             1.0,
         ];
         let found = real_roots(&p);
