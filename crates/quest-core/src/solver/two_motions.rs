@@ -70,18 +70,20 @@ impl TwoMotions {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> [Option<Motion>; 2] {
-        let limit = (10.0 * alignment.direction_resolution()).max(1e-7).powi(2);
+        let limit = alignment.direction_resolution().max(1e-7).powi(2);
         let per_parallax = alignment.parallax.powi(-2).max(1.0);
         let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
         let mut rest = Two::splat(f64::INFINITY);
-        for _ in 0..MAX_NEWTON_STEPS {
+        for count in 0..MAX_NEWTON_STEPS {
             let Step { next, turn, moved, residual } = motions.stepped(matches);
             // Not a number is no step either.
             let is_step = (turn + moved).simd_le(Two::splat(1.0));
             motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
             motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
-            // Quadratic: the error left is the square of the step. All solutions are within the parallax in rotation.
-            has_converged |= (turn * per_parallax + moved).simd_lt(Two::splat(limit)) & !is_over;
+            // Quadratic: the error left is the square of the step. All solutions are within the parallax in rotation, so that
+            // the first step has to be small beside it.
+            let size = if count == 0 { turn * per_parallax + moved } else { turn + moved };
+            has_converged |= size.simd_lt(Two::splat(limit)) & !is_over;
             rest = residual;
             is_over |= has_converged | !is_step;
             if is_over.all() {
