@@ -49,16 +49,14 @@ pub(crate) fn solve(
         }
         None => from_five(kinds, &alignment, five, &mut shortlist),
     };
-    match found {
-        Err(degeneracy) => out.set_degeneracy(degeneracy),
-        Ok(()) => {
-            if kinds == Kinds::All {
-                let q0_21 = alignment.q0_21;
-                out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
-            }
-            shortlist.write(kinds, matches, out);
-        }
+    if let Err(degeneracy) = found {
+        return out.set_degeneracy(degeneracy);
     }
+    if kinds == Kinds::All {
+        let q0_21 = alignment.q0_21;
+        out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
+    }
+    shortlist.write(kinds, matches, out);
 }
 
 fn solve_many(

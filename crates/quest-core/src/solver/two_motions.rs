@@ -195,8 +195,8 @@ fn solve(mut m: [[Two; 6]; 5]) -> [Two; 5] {
             let is_larger = m[i][k].abs().simd_gt(m[k][k].abs());
             for j in k..6 {
                 let exchanged = (m[i][j] ^ m[k][j]) & is_larger;
-                m[i][j] = m[i][j] ^ exchanged;
-                m[k][j] = m[k][j] ^ exchanged;
+                m[i][j] ^= exchanged;
+                m[k][j] ^= exchanged;
             }
         }
         // Kept for the way back.
