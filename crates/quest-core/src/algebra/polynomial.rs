@@ -290,14 +290,14 @@ impl<const N: usize> Chain<N> {
             at_infinity += u32::from(slope * direction < 0.0);
         }
         let (mut bound, at_infinity) = (end, f64::from(at_infinity));
-        while bound.changes != at_infinity {
+        while (bound.changes - at_infinity).abs() > 0.5 {
             [bound, _] = self.ends([4.0 * bound.x.abs().max(1.0) * direction; 2]);
             // A root this far out is one at infinity, of a polynomial of lower degree.
             if bound.x.abs() > 1e12 {
                 break;
             }
         }
-        (bound.changes != end.changes).then_some(bound)
+        ((bound.changes - end.changes).abs() > 0.5).then_some(bound)
     }
 
     fn isolate(&self, from: End, to: End, depth: u32, brackets: &mut Brackets<N>) {

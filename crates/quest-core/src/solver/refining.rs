@@ -50,14 +50,13 @@ pub(crate) fn solve(
         None => from_five(kinds, &alignment, five, &mut shortlist),
     };
     if let Err(degeneracy) = found {
-        out.set_degeneracy(degeneracy);
-    } else {
-        if kinds == Kinds::All {
-            let q0_21 = alignment.q0_21;
-            out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
-        }
-        shortlist.write(kinds, matches, out);
+        return out.set_degeneracy(degeneracy);
     }
+    if kinds == Kinds::All {
+        let q0_21 = alignment.q0_21;
+        out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
+    }
+    shortlist.write(kinds, matches, out);
 }
 
 fn solve_many(

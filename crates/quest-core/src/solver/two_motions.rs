@@ -71,24 +71,27 @@ impl TwoMotions {
         matches: &[Correspondence; 5],
     ) -> [Option<Motion>; 2] {
         let limit = alignment.direction_resolution().max(1e-7).powi(2);
+        let per_parallax = alignment.parallax.powi(-2).max(1.0);
         let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
-        let mut before = Two::splat(f64::INFINITY);
-        for _ in 0..MAX_NEWTON_STEPS {
-            let Step { next, square, residual } = motions.stepped(matches);
+        let mut rest = Two::splat(f64::INFINITY);
+        for count in 0..MAX_NEWTON_STEPS {
+            let Step { next, turn, moved, residual } = motions.stepped(matches);
             // Not a number is no step either.
-            let is_step = square.simd_le(Two::splat(1.0));
+            let is_step = (turn + moved).simd_le(Two::splat(1.0));
             motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
             motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
-            // Quadratic: the error left is the square of the step. Near another solution the steps of rounding are longer, and
-            // come to no end.
-            let is_rounding = square.simd_gt(before * 0.25) & residual.simd_lt(Two::splat(ROUNDING));
-            has_converged |= (square.simd_lt(Two::splat(limit)) | is_rounding) & !is_over;
-            before = square;
+            // Quadratic: the error left is the square of the step. All solutions are within the parallax in rotation, so that
+            // the first step has to be small beside it.
+            let size = if count == 0 { turn * per_parallax + moved } else { turn + moved };
+            has_converged |= size.simd_lt(Two::splat(limit)) & !is_over;
+            rest = residual;
             is_over |= has_converged | !is_step;
             if is_over.all() {
                 break;
             }
         }
+        // Near another solution the steps of rounding are longer, and come to no end.
+        has_converged |= rest.simd_lt(Two::splat(ROUNDING)) & !is_over;
         let ([first, second], converged) = (motions.apart(), has_converged.to_bitmask());
         [first.filter(|_| converged & 1 != 0), second.filter(|_| converged & 2 != 0)]
     }
@@ -107,12 +110,12 @@ impl TwoMotions {
         });
         let residual = equations.iter().fold(Two::ZERO, |sum, row| sum + row[5] * row[5]);
         let [w1, w2, w3, move1, move2] = solve(equations);
-        let square = w1 * w1 + w2 * w2 + w3 * w3 + move1 * move1 + move2 * move2;
+        let (turned, moved) = (w1 * w1 + w2 * w2 + w3 * w3, move1 * move1 + move2 * move2);
         // To first order a rotation by ω; any step of the iteration may differ from it to second order.
         let turn = [Two::splat(1.0), w1 * 0.5, w2 * 0.5, w3 * 0.5];
         let direction: TwoVectors = std::array::from_fn(|k| t[k] + (e1[k] * move1 + e2[k] * move2));
         let next = Self { q_21: normalized(&product(&turn, &self.q_21)), direction: normalized(&direction) };
-        Step { next, square, residual }
+        Step { next, turn: turned, moved, residual }
     }
 }
 
@@ -120,8 +123,9 @@ impl TwoMotions {
 struct Step {
     /// Where it leads.
     next: TwoMotions,
-    /// Its squared length (radians).
-    square: Two,
+    /// Its squared length (radians), in rotation and in the direction of the translation.
+    turn: Two,
+    moved: Two,
     /// The sum of the squared constraints before it.
     residual: Two,
 }
