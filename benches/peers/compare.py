@@ -9,6 +9,7 @@ number of iterations. A library that gives no pose is off by 180 degrees. Tables
 """
 
 import argparse
+import csv
 import json
 import time
 from collections.abc import Callable
@@ -195,9 +196,9 @@ def measure(cases: list[Case], libraries: list[str], seeds: int, repeats: int) -
                 # In turns: what else the machine does meets all of them.
                 for _ in range(repeats):
                     for name, run in runs.items():
-                        start = time.perf_counter()
+                        start = time.thread_time()
                         poses[name] = run()
-                        best[name] = min(best[name], time.perf_counter() - start)
+                        best[name] = min(best[name], time.thread_time() - start)
                 rows += [
                     Row(case, name, equal, error(case, poses[name]), 1e3 * best[name]) for name in libraries
                 ]
@@ -231,6 +232,14 @@ def table(rows: list[Row], title: str, libraries: list[str], keep: Callable[[Cas
         print(f"| {name} | " + " | ".join(numbers) + " |")
 
 
+def write(rows: list[Row], path: Path) -> None:
+    """Every estimate, to look at single pairs."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["name", "grade", "library", "equal", "error_deg", "milliseconds"])
+        writer.writerows([r.case.name, r.case.grade, *r[1:]] for r in rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="with manifest.json and pairs/")
@@ -238,11 +247,14 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="the smallest time of so many counts")
     parser.add_argument("--libraries", default=",".join(LIBRARIES))
     parser.add_argument("--only", default="", help="pairs whose name contains this")
+    parser.add_argument("--rows", type=Path, help="write every estimate to this CSV file")
     arguments = parser.parse_args()
     libraries = arguments.libraries.split(",")
     cases = [c for c in load(arguments.folder) if arguments.only in c.name]
     cv2.setNumThreads(1)
     rows = measure(cases, libraries, arguments.seeds, arguments.repeats)
+    if arguments.rows:
+        write(rows, arguments.rows)
     sources = sorted({c.source for c in cases})
     for equal, setting in ((False, "own defaults"), (True, "equal settings")):
         print(f"\n## {setting.capitalize()}")

@@ -6,8 +6,8 @@
 Scenes are realistic: rotations up to 30 degrees, all points in front of both cameras and inside both images. Errors
 are the metrics (61) and (62) of the paper, in radians, of the candidate closest to the truth; of essential matrices
 all four poses count. Compare like with like: libraries that return real solutions beside "exact" rows, one that
-returns a single pose with nothing. Times are those of the fastest round, on one thread, with the wrapper's own time
-in them; the second table says how long the cheapest call through each wrapper takes.
+returns a single pose with nothing. Times are means over the problems, each in its fastest round, on one thread, with
+the wrapper's own time in them; the second table says how long the cheapest call through each wrapper takes.
 """
 
 from __future__ import annotations
@@ -124,14 +124,14 @@ def peers() -> list[Peer]:
 
 
 def fastest(calls: list[Callable[[], object]], rounds: int) -> float:
-    """Microseconds a call, of the fastest round."""
-    best = float("inf")
+    """Microseconds a call: the mean over the calls, of each its fastest round, so that a busy machine matters little."""
+    best = [float("inf")] * len(calls)
     for _ in range(rounds):
-        start = time.perf_counter()
-        for call in calls:
+        for k, call in enumerate(calls):
+            start = time.perf_counter()
             call()
-        best = min(best, time.perf_counter() - start)
-    return 1e6 * best / len(calls)
+            best[k] = min(best[k], time.perf_counter() - start)
+    return 1e6 * sum(best) / len(calls)
 
 
 def judged(peer: Peer, kind: list[dict], rounds: int) -> dict:

@@ -3,6 +3,7 @@
 use quest_benches::SEED;
 use quest_benches::cells::Cell;
 use quest_core::Candidates;
+use quest_core::lanes::{BatchSolver, Essentials, ImageMatches, Instructions, Loss, Scorer, Stop, Tolerance};
 use quest_core::simulate::{Motion, Scene, SceneOptions};
 use quest_core::solver::SolverName;
 
@@ -28,6 +29,36 @@ fn no_solver_allocates() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Once the buffers have grown.
+#[test]
+fn no_batch_in_lanes_allocates() {
+    let options = SceneOptions { points: 130, ..SceneOptions::realistic() };
+    let scene = Scene::generate(&options, SEED, 0).unwrap();
+    let samples: Vec<[u32; 5]> = (0..101).map(|k| [k, k + 1, k + 7, k + 19, k + 29]).collect();
+    let mut image = ImageMatches::<f32>::new();
+    for m in &scene.matches {
+        let (a, b) = (m.bearing1() / m.bearing1().z, m.bearing2() / m.bearing2().z);
+        image.push([a.x, a.y], [b.x, b.y]);
+    }
+    for instructions in Instructions::ALL.into_iter().filter(|i| i.is_available()) {
+        let scorer = Scorer::with_instructions(instructions).unwrap();
+        for tolerance in [Tolerance::Tight, Tolerance::Loop] {
+            let solver = BatchSolver::with_instructions(tolerance, instructions).unwrap();
+            let (mut found, mut mask, mut candidates) = (Essentials::new(), Vec::new(), Candidates::new());
+            let mut all = || {
+                solver.solve_all(&scene.matches, &samples, &mut found).unwrap();
+                found.candidates(0, &scene.matches[..5], &mut candidates);
+                for e in &found.matrices()[..5] {
+                    std::hint::black_box(scorer.score(&image, e, 1e-3, Loss::default(), Stop::Never));
+                    std::hint::black_box(scorer.inliers(&image, e, 1e-3, &mut mask));
+                }
+            };
+            all();
+            assert_eq!(allocation_counter::measure(all).count_total, 0, "{instructions:?} {tolerance:?}");
         }
     }
 }

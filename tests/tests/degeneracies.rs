@@ -165,13 +165,16 @@ fn points_at_infinity() {
     }
 }
 
+/// What is done to a bearing.
+type Change = fn([f64; 3]) -> [f64; 3];
+
 /// What is finite at the door is finite behind it: every pose is, and those called exact satisfy the constraints.
 #[test]
 fn hostile_bearings_give_finite_poses_or_a_reason() {
     let one = scene(&SceneOptions::realistic(), SEED_DEGENERATE, 7);
     let bearings: Vec<[[f64; 3]; 2]> =
         one.matches.iter().map(|m| [(*m.bearing1()).into(), (*m.bearing2()).into()]).collect();
-    let changes: [(&str, fn([f64; 3]) -> [f64; 3]); 8] = [
+    let changes: [(&str, Change); 8] = [
         ("z = 0", |[x, y, _]| [x, y, 0.0]),
         ("negative zero", |[x, y, _]| [x, y, -0.0]),
         ("denormal z", |[x, y, _]| [x, y, 5e-324]),

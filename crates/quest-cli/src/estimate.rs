@@ -1,16 +1,18 @@
 //! `quest-cli estimate`: one pose from matches with outliers.
 
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use quest_core::InputError;
-use quest_core::robust::{self, EstimateError, Options, Priors};
+use quest_core::robust::{self, Estimate, EstimateError, Options, Priors, ThirdView};
 use quest_core::solver::SolverName;
-use quest_io::{EstimateRecord, Pair};
+use quest_core::{Correspondence, InputError};
+use quest_io::{EstimateRecord, Pair, ReadError, ThirdViewRecord};
 
 use crate::{
     Failure, Outcome, estimate_table,
+    in_order::in_order,
     input::InputOptions,
     options::{OutputOptions, solver_parser},
     progress::Progress,
@@ -27,16 +29,21 @@ Examples:
   quest-cli estimate pair.json --threshold 1.5 --seed 7 --format json
   quest-cli estimate points.csv --threshold 0.001
   quest-cli estimate pairs.jsonl -o results.jsonl
+  quest-cli estimate views12.json --third views13.json
 
-Files are those of `quest-cli solve`. With scores the best matches are tried first.
+Files are those of `quest-cli solve`. With scores the best matches are tried first. The pairs of JSON
+Lines are worked on by all cores, the results in the order of the lines.
+With --third the poses of views 1 and 2 and of views 1 and 3 are chosen so that the depths of their
+common points agree; a point is common where its numbers in view 1 are the same.
 
 Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
-  The model is general, planar (there may be a second pose, the runner-up), pure_rotation (no
-  translation that stands clear of the noise) or degenerate; the evidence is the median
-  residual of the inliers under each.
+  The model is general, planar (there may be a second pose, the runner-up) or pure_rotation (no
+  translation that stands clear of the noise); the evidence is the median residual of the
+  inliers under each. Matches that determine no pose, such as points on a line, are bad input;
+  among JSON Lines their model is degenerate, with a reason and without a pose.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
-  The same seed gives the same answer.
+  The same seed gives the same answer; each line of JSON Lines has random numbers of its own.
 
 Exit status:
   0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
@@ -64,33 +71,58 @@ pub(crate) struct Arguments {
     /// The solver of the samples; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
+    /// The matches of view 1 with a third view: of two possible poses the one that agrees with them is taken.
+    #[arg(long, value_name = "FILE")]
+    third: Option<PathBuf>,
     #[command(flatten)]
     output: OutputOptions,
+}
+
+/// The result of one pair.
+struct Estimated {
+    heading: String,
+    record: EstimateRecord,
+    focal_length: Option<f64>,
+    /// Why there is no pose, with the place.
+    refusal: Option<String>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut pairs = arguments.input.open(arguments.output.quiet)?;
     let is_lines = pairs.is_lines();
+    if arguments.third.is_some() && is_lines {
+        return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
+    }
     let mut writer = Writer::open(&arguments.output, is_lines)?;
     let mut progress = Progress::new("pairs", arguments.output.quiet);
     let mut outcome = Outcome::Answer;
-    while let Some(pair) = pairs.next()? {
-        if let Outcome::NoPose = one_pair(arguments, &pair, is_lines, &mut writer)? {
-            outcome = Outcome::NoPose;
-        }
-        progress.add(1);
-    }
+    let numbered = (0..).map_while(|index| Some((index, pairs.next().transpose()?)));
+    in_order(
+        numbered,
+        |(index, pair): (u64, Result<Pair, ReadError>)| one_pair(arguments, index, &pair?, is_lines),
+        |estimated: Result<Estimated, Failure>| {
+            let Estimated { heading, record, focal_length, refusal } = estimated?;
+            writer.write(&heading, record, focal_length)?;
+            if let Some(refusal) = refusal {
+                words::say("no pose", &refusal);
+                outcome = Outcome::NoPose;
+            }
+            progress.add(1);
+            Ok::<_, Failure>(())
+        },
+    )?;
     progress.finish();
     writer.finish(is_lines)?;
     Ok(outcome)
 }
 
 impl Arguments {
-    fn options(&self, pair: &Pair) -> Result<Options, Failure> {
+    fn options(&self, pair: &Pair, index: u64) -> Result<Options, Failure> {
         let options = Options {
             confidence: self.confidence,
             max_iterations: self.max_iterations,
             seed: self.seed,
+            index,
             solver: self.solver,
             ..Options::default()
         };
@@ -108,40 +140,51 @@ impl Arguments {
     }
 }
 
-fn one_pair(
-    arguments: &Arguments,
-    pair: &Pair,
-    is_lines: bool,
-    writer: &mut Writer<EstimateRecord>,
-) -> Result<Outcome, Failure> {
+fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> Result<Estimated, Failure> {
     let matches = pair.correspondences()?;
-    let options = arguments.options(pair)?;
+    let options = arguments.options(pair, index)?;
+    let third = arguments.third.as_deref().map(|file| third(arguments, file)).transpose()?;
     let start = Instant::now();
-    let priors = Priors { scores: pair.scores.as_deref(), ..Priors::default() };
-    let result = robust::estimate_with(&matches, &options, &priors);
+    let result = match &third {
+        None => {
+            let priors = Priors { scores: pair.scores.as_deref(), ..Priors::default() };
+            robust::estimate_with(&matches, &options, &priors).map(|estimate| (estimate, None))
+        }
+        Some((others, others_options)) => {
+            let found = robust::estimate_with_third_view(&matches, &options, others, others_options);
+            found.map(|found| (found.estimate_21.clone(), Some(found)))
+        }
+    };
     let elapsed_ms = start.elapsed().as_secs_f64() * 1e3;
     let (record, reason) = match result {
-        Ok(estimate) => (EstimateRecord::new(pair.name.clone(), &estimate, &pair.truth, elapsed_ms), None),
-        Err(EstimateError::Option { .. }) => return Err(Failure::Arguments(result_text(&result))),
+        Ok((estimate, third)) => (found(pair, &estimate, third.as_ref(), elapsed_ms), None),
+        Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
         // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
         Err(EstimateError::Input(error)) if !(is_lines && matches!(error, InputError::Degenerate(_))) => {
             return Err(pair.refuse(error).into());
         }
         Err(error) => {
-            let reason = error.to_string();
-            (EstimateRecord::no_pose(pair.name.clone(), reason.clone(), elapsed_ms), Some(reason))
+            (EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms), Some(error.to_string()))
         }
     };
     let name = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
     let heading = words::one_line(&format!("{name}: {} matches{}", matches.len(), summary(&record)));
-    writer.write(&heading, record, pair.focal_length())?;
-    let Some(reason) = reason else { return Ok(Outcome::Answer) };
-    words::say("no pose", &format!("{}: {reason}", pair.place));
-    Ok(Outcome::NoPose)
+    let refusal = reason.map(|reason| format!("{}: {reason}", pair.place));
+    Ok(Estimated { heading, record, focal_length: pair.focal_length(), refusal })
 }
 
-fn result_text<T>(result: &Result<T, EstimateError>) -> String {
-    result.as_ref().err().map(ToString::to_string).unwrap_or_default()
+/// The matches of view 1 with a third view.
+fn third(arguments: &Arguments, file: &Path) -> Result<(Vec<Correspondence>, Options), Failure> {
+    let Some(pair) = arguments.input.open_file(file, arguments.output.quiet)?.next()? else {
+        return Err(Failure::Arguments(format!("{}: found no pair, expected one", file.display())));
+    };
+    // Random numbers of its own.
+    Ok((pair.correspondences()?, arguments.options(&pair, 1)?))
+}
+
+fn found(pair: &Pair, estimate: &Estimate, third: Option<&ThirdView>, elapsed_ms: f64) -> EstimateRecord {
+    let record = EstimateRecord::new(pair.name.clone(), estimate, &pair.truth, elapsed_ms);
+    EstimateRecord { third_view: third.map(ThirdViewRecord::new), ..record }
 }
 
 /// What the heading says beside the number of matches.

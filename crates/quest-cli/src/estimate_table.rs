@@ -1,7 +1,7 @@
 //! An estimate as a table.
 
 use comfy_table::{Cell, ColumnConstraint, Table};
-use quest_io::{EstimateRecord, PoseRecord};
+use quest_io::{EstimateRecord, PoseRecord, ThirdViewRecord};
 
 use crate::table::{self, angle_axis, decimals, right, short, vector};
 
@@ -34,9 +34,10 @@ pub(crate) fn text(record: &EstimateRecord, unit: &str) -> Option<String> {
         |first: usize| (first..first + 3).map(|k| found.covariance[k][k]).sum::<f64>().max(0.0).sqrt();
     let size = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), short);
     let evidence = &found.evidence;
+    let third = record.third_view.as_ref().map_or_else(String::new, third_view);
     Some(format!(
         "{}\n\nstandard deviation  R {} deg, t {}\nmedian residual     {} {unit} general, {} {unit} plane, {} {unit} rotation \
-         alone\nnoise               {} {unit}",
+         alone\nnoise               {} {unit}{third}",
         table.trim_fmt(),
         short(deviation(0).to_degrees()),
         short(deviation(3)),
@@ -45,6 +46,16 @@ pub(crate) fn text(record: &EstimateRecord, unit: &str) -> Option<String> {
         size(evidence.rotation_px),
         short(found.noise_px),
     ))
+}
+
+/// What the third view decided.
+fn third_view(third: &ThirdViewRecord) -> String {
+    let Some(disagreement) = third.disagreement else {
+        return "\nthird view          decides nothing: too few points are common".to_owned();
+    };
+    let other =
+        third.next_best.map_or_else(String::new, |other| format!(", {} with the other pose", short(other)));
+    format!("\nthird view          depths disagree by {} of the noise{other}", short(disagreement))
 }
 
 fn row(

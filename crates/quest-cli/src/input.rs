@@ -1,6 +1,9 @@
 //! The pairs that a subcommand reads: options, cameras of the command line, warnings.
 
-use std::{collections::HashSet, path::PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use quest_core::Camera;
@@ -38,7 +41,12 @@ pub(crate) struct Input<'a> {
 
 impl InputOptions {
     pub(crate) fn open(&self, quiet: bool) -> Result<Input<'_>, ReadError> {
-        let pairs = quest_io::read(&self.file, self.input_format.map(Into::into))?;
+        self.open_file(&self.file, quiet)
+    }
+
+    /// Another file with the same cameras and of the same form.
+    pub(crate) fn open_file(&self, file: &Path, quiet: bool) -> Result<Input<'_>, ReadError> {
+        let pairs = quest_io::read(file, self.input_format.map(Into::into))?;
         Ok(Input { options: self, pairs, quiet, told: HashSet::new() })
     }
 

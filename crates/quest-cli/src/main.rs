@@ -5,6 +5,7 @@
 mod candidate_table;
 mod estimate;
 mod estimate_table;
+mod in_order;
 mod input;
 mod options;
 mod progress;

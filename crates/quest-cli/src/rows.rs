@@ -45,12 +45,22 @@ const COLUMNS: [&str; 18] = [
 /// One row of CSV for each candidate of the pair with number `pair`, counted from one; the first pair brings
 /// the header.
 pub(crate) fn write_candidates(writer: &mut dyn Write, pair: usize, record: &SolveRecord) -> io::Result<()> {
+    let rows = record.candidates.iter().enumerate().map(|(i, candidate)| row(pair, i + 1, record, candidate));
+    write_rows(writer, (pair == 1).then_some(&COLUMNS), rows)
+}
+
+/// Rows of CSV, after a header where there is one.
+fn write_rows<R: IntoIterator<Item = String>>(
+    writer: &mut dyn Write,
+    header: Option<&[&str]>,
+    rows: impl IntoIterator<Item = R>,
+) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(writer);
-    if pair == 1 {
-        csv.write_record(COLUMNS)?;
+    if let Some(header) = header {
+        csv.write_record(header)?;
     }
-    for (index, candidate) in record.candidates.iter().enumerate() {
-        csv.write_record(row(pair, index + 1, record, candidate))?;
+    for row in rows {
+        csv.write_record(row.into_iter().collect::<Vec<_>>())?;
     }
     csv.flush()
 }
@@ -105,10 +115,6 @@ const ESTIMATE_COLUMNS: [&str; 18] = [
 /// One row of CSV for the estimate of the pair with number `pair`, counted from one, its fields empty where there is no
 /// pose; the first pair brings the header.
 pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &EstimateRecord) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
-    if pair == 1 {
-        csv.write_record(ESTIMATE_COLUMNS)?;
-    }
     let mut row = vec![
         pair.to_string(),
         record.name.clone().unwrap_or_default(),
@@ -127,8 +133,7 @@ pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &Estim
     for error in [record.rotation_error_deg, record.translation_error_deg] {
         row.push(error.map(text).unwrap_or_default());
     }
-    csv.write_record(row)?;
-    csv.flush()
+    write_rows(writer, (pair == 1).then_some(&ESTIMATE_COLUMNS), [row])
 }
 
 /// All digits, with an exponent where it is shorter; nothing for what is not a number.

@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use clap::{Args, ValueEnum};
 use quest_core::{
-    Candidates, Degeneracy, InputError,
+    Candidates, Correspondence, Degeneracy, InputError,
     solver::{Kinds, SolverName},
 };
-use quest_io::{Pair, SolveRecord};
+use quest_io::{Pair, ReadError, SolveRecord};
 
 use crate::{
     Failure, Outcome, candidate_table,
@@ -92,11 +92,7 @@ fn one_pair(
     writer: &mut Writer<SolveRecord>,
 ) -> Result<Outcome, Failure> {
     let info = arguments.solver.info();
-    let matches = pair.correspondences()?;
-    if matches.len() < info.min_matches {
-        let error = InputError::TooFewMatches { found: matches.len(), needed: info.min_matches };
-        return Err(pair.refuse(error).into());
-    }
+    let matches = enough_matches(pair, arguments.solver)?;
     let mut found = Candidates::new();
     let kinds = match arguments.kinds {
         KindsArgument::All => Kinds::All,
@@ -109,24 +105,13 @@ fn one_pair(
     }
 
     let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
-    let most_in_front = record.candidates.iter().map(|c| c.in_front).max();
     let hidden = if arguments.all { 0 } else { record.drop_unfeasible() };
     let heading = heading(pair, &record, found.degeneracy());
     let is_empty = record.candidates.is_empty();
     writer.write(&heading, record, pair.focal_length())?;
 
     if is_empty {
-        let why = match (most_in_front, found.degeneracy()) {
-            (Some(most), _) => format!(
-                "none of the {hidden} candidates has all {} points in front of both cameras, the best has {most}; \
-                 --all lists them",
-                matches.len()
-            ),
-            (None, Some(degeneracy)) => degeneracy.to_string(),
-            (None, None) => "the solver found no candidate".to_owned(),
-        };
-        words::say("no pose", &format!("{}: {why}", pair.place));
-        return Ok(Outcome::NoPose);
+        return Ok(no_pose(pair, &found, matches.len()));
     }
     if hidden > 0 && !arguments.output.quiet {
         let what = if hidden == 1 { "candidate with points" } else { "candidates with points" };
@@ -136,6 +121,31 @@ fn one_pair(
         );
     }
     Ok(Outcome::Answer)
+}
+
+/// The matches of a pair, at least as many as the solver needs.
+pub(crate) fn enough_matches(pair: &Pair, solver: SolverName) -> Result<Vec<Correspondence>, ReadError> {
+    let matches = pair.correspondences()?;
+    let (found, needed) = (matches.len(), solver.info().min_matches);
+    if found < needed {
+        return Err(pair.refuse(InputError::TooFewMatches { found, needed }));
+    }
+    Ok(matches)
+}
+
+/// Says why there is nothing to be shown of what a solver found.
+pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
+    let why = match (found.iter().map(|c| c.in_front).max(), found.degeneracy()) {
+        (Some(most), _) => format!(
+            "none of the {} candidates has all {matches} points in front of both cameras, the best has {most}; --all \
+             lists them",
+            found.len()
+        ),
+        (None, Some(degeneracy)) => degeneracy.to_string(),
+        (None, None) => "the solver found no candidate".to_owned(),
+    };
+    words::say("no pose", &format!("{}: {why}", pair.place));
+    Outcome::NoPose
 }
 
 /// The line above the table.

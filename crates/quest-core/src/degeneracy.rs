@@ -46,16 +46,71 @@ pub(crate) fn diagnose_fewer_than(needed: usize, matches: &[Correspondence]) -> 
     Degeneracy::RankDeficient
 }
 
-/// Whether the points lie on a line in both images: their bearings in a plane through the camera.
+/// Whether the points lie on a line in both images, to rounding.
 fn on_a_line<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> bool {
-    let (mut moments1, mut moments2) = (Matrix3::zeros(), Matrix3::zeros());
+    // Squares of distances: rounding of the moments, far above SAME².
+    nearest_lines(matches).iter().all(|line| line.square_distance < 1e-14)
+}
+
+/// Whether all points, or all but one, lie on a line in both images up to these mean distances, in radians: noise is then all
+/// that tells them from points that do.
+pub(crate) fn nearly_on_a_line(matches: &[Correspondence], distances: [f64; 2]) -> bool {
+    let lines = nearest_lines(matches.iter());
+    let off = |m: &Correspondence| {
+        let [one, two] = &lines;
+        (one.normal.dot(m.bearing1()) / distances[0])
+            .abs()
+            .max((two.normal.dot(m.bearing2()) / distances[1]).abs())
+    };
+    let Some(farthest) = (0..matches.len()).max_by(|&i, &j| off(&matches[i]).total_cmp(&off(&matches[j])))
+    else {
+        return true;
+    };
+    let others = matches.iter().enumerate().filter(|(i, _)| *i != farthest).map(|(_, m)| m);
+    nearest_lines(others).iter().zip(distances).all(|(line, d)| line.square_distance < d * d)
+}
+
+/// The line nearest to the points of an image: the plane through the camera nearest to their bearings.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    normal: Vector3<f64>,
+    /// The mean over the points, in squared radians.
+    square_distance: f64,
+}
+
+fn nearest_lines<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> [Line; 2] {
+    let mut moments = [Matrix3::zeros(); 2];
+    let mut count = 0.0;
     for m in matches {
-        moments1 += m.bearing1() * m.bearing1().transpose();
-        moments2 += m.bearing2() * m.bearing2().transpose();
+        moments[0] += m.bearing1() * m.bearing1().transpose();
+        moments[1] += m.bearing2() * m.bearing2().transpose();
+        count += 1.0;
     }
-    [moments1, moments2].iter().all(|m| {
-        let values = SymmetricEigen::new(*m).eigenvalues;
-        // Squares of distances from the plane: rounding of the moments, far above SAME².
-        values.min() < 1e-14 * values.max()
+    moments.map(|moments| {
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(moments);
+        let (smallest, value) = eigenvalues.argmin();
+        Line { normal: eigenvectors.column(smallest).into(), square_distance: value / count }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_does_not_make_a_line_an_area() {
+        let on_line = |i: u32, off: f64| {
+            let (s, off) = (0.1 * f64::from(i), if i.is_multiple_of(2) { off } else { -off });
+            Correspondence::from_image_points([s, 0.3 * s + off], [0.9 * s * s, 0.2 - off]).unwrap()
+        };
+        let with = |off: f64| -> Vec<_> { (0..8).map(|i| on_line(i, off)).collect() };
+        assert!(nearly_on_a_line(&with(1e-4), [1e-3; 2]) && !nearly_on_a_line(&with(1e-2), [1e-3; 2]));
+        // One point beside the line changes nothing, two do; a line in one view alone is no line.
+        let mut some = with(1e-4);
+        some[3] = Correspondence::from_image_points([0.3, 0.5], [0.4, -0.3]).unwrap();
+        assert!(nearly_on_a_line(&some, [1e-3; 2]));
+        some[5] = Correspondence::from_image_points([0.1, -0.4], [0.2, 0.6]).unwrap();
+        assert!(!nearly_on_a_line(&some, [1e-3; 2]));
+        assert!(!nearly_on_a_line(&with(1e-4), [1e-3, 1e-6]));
+    }
 }

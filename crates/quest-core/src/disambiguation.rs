@@ -174,20 +174,28 @@ mod tests {
         let (mut asked, mut right) = (0, 0);
         for _ in 0..20 {
             let (truth, matches) = views(&mut rng, 0.3);
-            let poses = matches.each_ref().map(|m| {
-                let found = robust::estimate(m, &options).unwrap();
-                assert_eq!(found.model, Model::Planar);
-                [Some(found.pose), found.runner_up.map(|r| r.pose)].into_iter().flatten().collect::<Vec<_>>()
-            });
-            if poses[0].len() < 2 {
+            let [first, second] = &matches;
+            let alone = robust::estimate(first, &options).unwrap();
+            assert_eq!(alone.model, Model::Planar);
+            if alone.runner_up.is_none() {
                 continue;
             }
-            let choice =
-                choose(&matches[0], &poses[0], &matches[1], &poses[1], 0.3 / FOCAL_LENGTH).unwrap().unwrap();
-            let errors: Vec<_> = poses[0].iter().map(|p| p.rotation_error(&truth[0])).collect();
-            asked += 1;
-            right += usize::from(errors[choice.pose_21] <= errors[1 - choice.pose_21]);
+            // The lists need not have the same order, nor the same points.
+            let some: Vec<_> = second.iter().rev().skip(5).copied().collect();
+            let found = robust::estimate_with_third_view(first, &options, &some, &options).unwrap();
+            let choice = found.choice.unwrap();
             assert!(choice.disagreement <= choice.next_best);
+            let error = |pose: &RelativePose| pose.rotation_error(&truth[0]);
+            let (pose, other) = (found.estimate_21.pose, found.estimate_21.runner_up.unwrap().pose);
+            // The same two poses as without the third view, in the order that it decides.
+            let expected = if choice.pose_21 == 0 { alone.pose } else { alone.runner_up.unwrap().pose };
+            assert!(pose.rotation_error(&expected) < 1e-12 && (pose.t_21 - expected.t_21).norm() < 1e-9);
+            assert_eq!(
+                found.estimate_21.inliers.iter().filter(|i| **i).count(),
+                found.estimate_21.inlier_count
+            );
+            asked += 1;
+            right += usize::from(error(&pose) <= error(&other));
         }
         assert!(asked >= 5 && right * 10 >= asked * 9, "{right} of {asked}");
     }

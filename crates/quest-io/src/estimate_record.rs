@@ -1,7 +1,7 @@
 //! The result of a robust estimate as it stands in files.
 
-use quest_core::RelativePose;
-use quest_core::robust::{Estimate, Evidence, RunnerUp};
+use quest_core::robust::{Estimate, EstimateError, Evidence, RunnerUp, ThirdView};
+use quest_core::{InputError, RelativePose};
 use serde::Serialize;
 
 use crate::Truth;
@@ -13,7 +13,8 @@ pub struct EstimateRecord {
     /// What the input calls the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// A name of [`quest_core::robust::Model`]; `None` where no pose could be found.
+    /// A name of [`quest_core::robust::Model`]; `degenerate` where the matches determine no pose, `None` where none could be
+    /// found.
     pub model: Option<&'static str>,
     /// Why there is no pose.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -21,6 +22,9 @@ pub struct EstimateRecord {
     /// What was found.
     #[serde(flatten)]
     pub found: Option<FoundRecord>,
+    /// What a third view says, where it was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub third_view: Option<ThirdViewRecord>,
     /// How long it took, in milliseconds.
     pub elapsed_ms: f64,
     /// The angle in degrees to the true rotation, where it is known.
@@ -98,6 +102,40 @@ pub struct EvidenceRecord {
     pub general_px: Option<f64>,
 }
 
+/// The pose of a third view, `X3 = R_31 X1 + t_31`, and how well its depths agree with those of the pair.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ThirdViewRecord {
+    /// The rotation as a unit quaternion `w, x, y, z` with `w >= 0`.
+    pub q_31: [f64; 4],
+    /// The rows of the rotation matrix.
+    #[serde(rename = "R_31")]
+    pub r_31: [[f64; 3]; 3],
+    /// The translation; the mean absolute depth over views 1 and 3 is 1.
+    pub t_31: [f64; 3],
+    /// How far the depths are apart, in units of the noise; `None` where too few points are common.
+    pub disagreement: Option<f64>,
+    /// The same for the other pose of the pair; `None` where there is no other.
+    pub next_best: Option<f64>,
+    /// The length of `t_31` over that of `t_21`, in one common scale.
+    pub ratio: Option<f64>,
+}
+
+impl ThirdViewRecord {
+    /// The record of a third view.
+    #[must_use]
+    pub fn new(found: &ThirdView) -> Self {
+        let PoseRecord { q_21, r_21, t_21, .. } = PoseRecord::new(&found.estimate_31.pose);
+        Self {
+            q_31: q_21,
+            r_31: r_21,
+            t_31: t_21,
+            disagreement: found.choice.map(|c| c.disagreement),
+            next_best: found.choice.map(|c| c.next_best).filter(|x| x.is_finite()),
+            ratio: found.choice.map(|c| c.ratio),
+        }
+    }
+}
+
 impl EstimateRecord {
     /// The record of an estimate.
     #[must_use]
@@ -108,6 +146,7 @@ impl EstimateRecord {
             model: Some(estimate.model.name()),
             reason: None,
             found: Some(FoundRecord::new(estimate, truth)),
+            third_view: None,
             elapsed_ms,
             rotation_error_deg: truth.rotation_error_deg(pose),
             translation_error_deg: truth.translation_error_deg(pose),
@@ -116,12 +155,14 @@ impl EstimateRecord {
 
     /// The record of matches that gave no pose.
     #[must_use]
-    pub fn no_pose(name: Option<String>, reason: String, elapsed_ms: f64) -> Self {
+    pub fn no_pose(name: Option<String>, error: &EstimateError, elapsed_ms: f64) -> Self {
+        let is_degenerate = matches!(error, EstimateError::Input(InputError::Degenerate(_)));
         Self {
             name,
-            model: None,
-            reason: Some(reason),
+            model: is_degenerate.then_some("degenerate"),
+            reason: Some(error.to_string()),
             found: None,
+            third_view: None,
             elapsed_ms,
             rotation_error_deg: None,
             translation_error_deg: None,

@@ -31,7 +31,9 @@ mod record;
 
 pub use camera::camera;
 pub use error::{Fault, Place, ReadError};
-pub use estimate_record::{EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord};
+pub use estimate_record::{
+    EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord, ThirdViewRecord,
+};
 pub use json_text::write_json;
 pub use output::{Output, WriteError};
 pub use pair::{Pair, Truth};

@@ -1,12 +1,11 @@
 //! `Candidate`: one pose that may be the true one.
 
-use nalgebra::{Quaternion, UnitQuaternion};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quest_core::{Correspondence, RelativePose};
 
-use crate::arrays;
+use crate::pose::{Pose, PoseState};
 
 /// A pose that may be the true one, as ``solve`` returns it: ``X2 = R @ X1 + t``.
 ///
@@ -22,7 +21,7 @@ pub(crate) struct Candidate {
     /// ``"rotation_only"`` the rotation that best aligns the bearings.
     #[pyo3(get)]
     kind: String,
-    pose: RelativePose,
+    pose: Pose,
     depths1: Vec<f64>,
     depths2: Vec<f64>,
     /// float : How far the matches are from satisfying the epipolar constraint, in radians.
@@ -40,7 +39,7 @@ impl Candidate {
     pub(crate) fn new(candidate: &quest_core::Candidate, matches: &[Correspondence]) -> Self {
         let quest_core::Candidate { kind, pose, residual, in_front } = *candidate;
         let (depths1, depths2) = matches.iter().map(|m| depths(&pose, m)).unzip();
-        Self { kind: kind.name().to_owned(), pose: canonical(pose), depths1, depths2, residual, in_front }
+        Self { kind: kind.name().to_owned(), pose: Pose::new(&pose), depths1, depths2, residual, in_front }
     }
 }
 
@@ -50,21 +49,13 @@ fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
     pose.depths(m).map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
 }
 
-/// The same pose with the sign of the quaternion that is shown, so that a pickled copy is equal.
-pub(crate) fn canonical(pose: RelativePose) -> RelativePose {
-    let [w, i, j, k] = pose.wxyz();
-    RelativePose { q_21: UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)), ..pose }
-}
-
-type State = (String, [f64; 4], [f64; 3], Vec<f64>, Vec<f64>, f64, usize);
+type State = (String, PoseState, Vec<f64>, Vec<f64>, f64, usize);
 
 /// The candidate that ``Candidate.__reduce__`` took apart.
 #[pyfunction]
 pub(crate) fn _candidate(state: State) -> Candidate {
-    let (kind, [w, i, j, k], t_21, depths1, depths2, residual, in_front) = state;
-    let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
-    let pose = RelativePose::new(q_21, t_21.into());
-    Candidate { kind, pose, depths1, depths2, residual, in_front }
+    let (kind, pose, depths1, depths2, residual, in_front) = state;
+    Candidate { kind, pose: Pose::from_state(pose), depths1, depths2, residual, in_front }
 }
 
 #[pymethods]
@@ -73,26 +64,25 @@ impl Candidate {
     #[getter]
     #[pyo3(name = "R")]
     fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        arrays::to_numpy(py, self.r_21().to_vec())
+        self.pose.r(py)
     }
 
     /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t_21.as_slice().to_pyarray(py)
+        self.pose.t(py)
     }
 
     /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
     #[getter]
     fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.wxyz().to_pyarray(py)
+        self.pose.quat_wxyz(py)
     }
 
     /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
     #[getter]
     fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let [w, x, y, z] = self.pose.wxyz();
-        [x, y, z, w].to_pyarray(py)
+        self.pose.quat_xyzw(py)
     }
 
     /// numpy.ndarray of shape (N,) : The depth of each match in view 1, in the unit of ``t``.
@@ -129,9 +119,7 @@ impl Candidate {
             |depths: &[f64]| -> Vec<_> { depths.iter().map(|&d| d.is_finite().then_some(d)).collect() };
         let dict = PyDict::new(py);
         dict.set_item("kind", &self.kind)?;
-        dict.set_item("q_21", self.pose.wxyz().to_vec())?;
-        dict.set_item("R_21", self.r_21().map(Vec::from).to_vec())?;
-        dict.set_item("t_21", self.pose.t_21.as_slice())?;
+        self.pose.write_to(&dict)?;
         dict.set_item("depths1", finite(&self.depths1))?;
         dict.set_item("depths2", finite(&self.depths2))?;
         dict.set_item("residual", self.residual)?;
@@ -142,24 +130,13 @@ impl Candidate {
 
     fn __repr__(&self) -> String {
         let Self { kind, pose, residual, in_front, depths1, .. } = self;
-        let (q, t) = (pose.wxyz(), pose.t_21.as_slice());
-        format!(
-            "<Candidate {kind}: quat_wxyz={q:.6?}, t={t:.6?}, residual={residual:.1e}, in_front={in_front} of {}>",
-            depths1.len()
-        )
+        let (pose, of) = (pose.text(), depths1.len());
+        format!("<Candidate {kind}: {pose}, residual={residual:.1e}, in_front={in_front} of {of}>")
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
         let Self { kind, pose, depths1, depths2, residual, in_front } = self;
-        let (q, t) = (pose.wxyz(), pose.t_21.into());
-        let state = (kind.clone(), q, t, depths1.clone(), depths2.clone(), *residual, *in_front);
+        let state = (kind.clone(), pose.state(), depths1.clone(), depths2.clone(), *residual, *in_front);
         Ok((py.import("quest_pose._core")?.getattr("_candidate")?, (state,)))
-    }
-}
-
-impl Candidate {
-    fn r_21(&self) -> [[f64; 3]; 3] {
-        // nalgebra keeps columns, NumPy rows.
-        self.pose.r_21().transpose().into()
     }
 }

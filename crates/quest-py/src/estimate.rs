@@ -1,6 +1,6 @@
 //! `estimate`: one pose from matches with outliers.
 
-use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -8,8 +8,8 @@ use quest_core::RelativePose;
 use quest_core::robust::{self, Evidence, KnownDirection, Model, Options, Priors};
 
 use crate::arrays;
-use crate::candidate::canonical;
 use crate::errors::{self, QuestError};
+use crate::pose::{Pose, PoseState};
 use crate::solve::{Views, solver_named};
 
 /// One pose from matches with outliers.
@@ -30,6 +30,8 @@ use crate::solve::{Views, solver_named};
 ///     At least and at most so many samples are drawn.
 /// seed : int
 ///     The same seed gives the same answer, bit for bit.
+/// index : int
+///     Which of the pairs that share a seed this is: each has random numbers of its own.
 /// solver : str, optional
 ///     The solver of the samples, one of the names in ``solvers()``; the first of them where absent.
 /// scores : array_like of shape (N,), optional
@@ -47,8 +49,8 @@ use crate::solve::{Views, solver_named};
 /// Raises
 /// ------
 /// NoPose
-///     Where the best pose agrees with no more matches than chance explains. With fewer than ten matches the best
-///     pose is always returned, with its runner-up.
+///     Where the best pose agrees with no more matches than chance explains. With fewer than ten matches, of which
+///     that cannot be said, the best pose is returned where five agree with it, with its runner-up.
 /// TooFewMatches
 ///     For fewer than five matches, or than the solver takes.
 /// NotFinite, ShapeMismatch, DegenerateInput, BadCamera
@@ -62,7 +64,7 @@ use crate::solve::{Views, solver_named};
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
-    seed=0, solver=None, scores=None, initial_pose=None, known_direction=None
+    seed=0, index=0, solver=None, scores=None, initial_pose=None, known_direction=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
@@ -77,6 +79,7 @@ pub(crate) fn estimate(
     min_iterations: usize,
     max_iterations: usize,
     seed: u64,
+    index: u64,
     solver: Option<&str>,
     scores: Option<&Bound<'_, PyAny>>,
     initial_pose: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
@@ -93,6 +96,7 @@ pub(crate) fn estimate(
         min_iterations,
         max_iterations,
         seed,
+        index,
         solver,
         ..Options::default()
     };
@@ -151,34 +155,11 @@ fn vector3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
     Ok(numbers.into())
 }
 
-type PoseState = ([f64; 4], [f64; 3]);
-
-fn pose_state(pose: &RelativePose) -> PoseState {
-    (pose.wxyz(), pose.t_21.into())
-}
-
-fn pose_from(([w, i, j, k], t): PoseState) -> RelativePose {
-    RelativePose::new(UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k)), t.into())
-}
-
-fn rotation_rows(pose: &RelativePose) -> Vec<[f64; 3]> {
-    // nalgebra keeps columns, NumPy rows.
-    let rows: [[f64; 3]; 3] = pose.r_21().transpose().into();
-    rows.to_vec()
-}
-
-fn set_pose(dict: &Bound<'_, PyDict>, pose: &RelativePose) -> PyResult<()> {
-    dict.set_item("q_21", pose.wxyz().to_vec())?;
-    dict.set_item("R_21", rotation_rows(pose).into_iter().map(Vec::from).collect::<Vec<_>>())?;
-    dict.set_item("t_21", pose.t_21.as_slice())?;
-    dict.set_item("parallax", pose.t_21.norm())
-}
-
 /// Another pose that the matches of an estimate may mean: ``X2 = R @ X1 + t``.
 #[pyclass(frozen, eq, module = "quest_pose")]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RunnerUp {
-    pose: RelativePose,
+    pose: Pose,
     /// float : How well the pose explains all matches, from 0 to 1.
     #[pyo3(get)]
     score: f64,
@@ -192,12 +173,12 @@ type RunnerUpState = (PoseState, f64, usize);
 /// The runner-up that ``RunnerUp.__reduce__`` took apart.
 #[pyfunction]
 pub(crate) fn _runner_up(state: RunnerUpState) -> RunnerUp {
-    RunnerUp { pose: pose_from(state.0), score: state.1, inlier_count: state.2 }
+    RunnerUp { pose: Pose::from_state(state.0), score: state.1, inlier_count: state.2 }
 }
 
 impl RunnerUp {
     fn state(&self) -> RunnerUpState {
-        (pose_state(&self.pose), self.score, self.inlier_count)
+        (self.pose.state(), self.score, self.inlier_count)
     }
 }
 
@@ -207,49 +188,46 @@ impl RunnerUp {
     #[getter]
     #[pyo3(name = "R")]
     fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        arrays::to_numpy(py, rotation_rows(&self.pose))
+        self.pose.r(py)
     }
 
     /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t_21.as_slice().to_pyarray(py)
+        self.pose.t(py)
     }
 
     /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
     #[getter]
     fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.wxyz().to_pyarray(py)
+        self.pose.quat_wxyz(py)
     }
 
     /// numpy.ndarray of shape (4,) : The same quaternion scalar last.
     #[getter]
     fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let [w, x, y, z] = self.pose.wxyz();
-        [x, y, z, w].to_pyarray(py)
+        self.pose.quat_xyzw(py)
     }
 
     /// float : The length of ``t``.
     #[getter]
     fn parallax(&self) -> f64 {
-        self.pose.t_21.norm()
+        self.pose.parallax()
     }
 
     /// The runner-up as plain numbers and lists, ready for ``json.dumps``.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        set_pose(&dict, &self.pose)?;
+        self.pose.write_to(&dict)?;
+        dict.set_item("parallax", self.parallax())?;
         dict.set_item("score", self.score)?;
         dict.set_item("inlier_count", self.inlier_count)?;
         Ok(dict)
     }
 
     fn __repr__(&self) -> String {
-        let (q, t) = (self.pose.wxyz(), self.pose.t_21.as_slice());
-        format!(
-            "<RunnerUp: quat_wxyz={q:.6?}, t={t:.6?}, inlier_count={}, score={:.3}>",
-            self.inlier_count, self.score
-        )
+        let Self { pose, inlier_count, score } = self;
+        format!("<RunnerUp: {}, inlier_count={inlier_count}, score={score:.3}>", pose.text())
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (RunnerUpState,))> {
@@ -266,11 +244,11 @@ impl RunnerUp {
 pub(crate) struct Estimate {
     /// str : Which model the matches support.
     ///
-    /// ``"general"``, ``"planar"`` (there may be a second pose, the runner-up), ``"pure_rotation"`` (no translation that
-    /// stands clear of the noise: ``t`` is the small vector that is left) or ``"degenerate"``.
+    /// ``"general"``, ``"planar"`` (there may be a second pose, the runner-up) or ``"pure_rotation"`` (no translation that
+    /// stands clear of the noise: ``t`` is the small vector that is left).
     #[pyo3(get)]
     model: String,
-    pose: RelativePose,
+    pose: Pose,
     covariance: Matrix6<f64>,
     inliers: Vec<bool>,
     /// float : How well the pose explains all matches, from 0 to 1.
@@ -296,7 +274,7 @@ pub(crate) fn _estimate(state: State) -> Estimate {
     let (model, pose, covariance, inliers, score, iterations, runner_up, evidence, noise_px) = state;
     Estimate {
         model,
-        pose: pose_from(pose),
+        pose: Pose::from_state(pose),
         covariance: Matrix6::from_iterator(covariance),
         inliers,
         score,
@@ -309,17 +287,17 @@ pub(crate) fn _estimate(state: State) -> Estimate {
 
 impl Estimate {
     /// An estimate of the core.
-    fn new(found: &robust::Estimate) -> Self {
+    pub(crate) fn new(found: &robust::Estimate) -> Self {
         let Evidence { rotation_px, planar_px, general_px } = found.evidence;
         Self {
             model: Model::name(found.model).to_owned(),
-            pose: canonical(found.pose),
+            pose: Pose::new(&found.pose),
             covariance: found.covariance,
             inliers: found.inliers.clone(),
             score: found.score,
             iterations: found.iterations,
             runner_up: found.runner_up.map(|other| RunnerUp {
-                pose: canonical(other.pose),
+                pose: Pose::new(&other.pose),
                 score: other.score,
                 inlier_count: other.inlier_count,
             }),
@@ -341,32 +319,31 @@ impl Estimate {
     #[getter]
     #[pyo3(name = "R")]
     fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        arrays::to_numpy(py, rotation_rows(&self.pose))
+        self.pose.r(py)
     }
 
     /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t_21.as_slice().to_pyarray(py)
+        self.pose.t(py)
     }
 
     /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
     #[getter]
     fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.wxyz().to_pyarray(py)
+        self.pose.quat_wxyz(py)
     }
 
     /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
     #[getter]
     fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let [w, x, y, z] = self.pose.wxyz();
-        [x, y, z, w].to_pyarray(py)
+        self.pose.quat_xyzw(py)
     }
 
     /// float : The length of ``t``.
     #[getter]
     fn parallax(&self) -> f64 {
-        self.pose.t_21.norm()
+        self.pose.parallax()
     }
 
     /// numpy.ndarray of shape (N,) of bool : Which matches are within the threshold and in front of both cameras.
@@ -411,7 +388,8 @@ impl Estimate {
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("model", &self.model)?;
-        set_pose(&dict, &self.pose)?;
+        self.pose.write_to(&dict)?;
+        dict.set_item("parallax", self.parallax())?;
         let covariance: Vec<_> = self.covariance_rows().into_iter().map(Vec::from).collect();
         dict.set_item("covariance", covariance)?;
         dict.set_item("inliers", &self.inliers)?;
@@ -429,10 +407,10 @@ impl Estimate {
     }
 
     fn __repr__(&self) -> String {
-        let (q, t) = (self.pose.wxyz(), self.pose.t_21.as_slice());
         format!(
-            "<Estimate {}: quat_wxyz={q:.6?}, t={t:.6?}, inliers={} of {}, score={:.3}>",
+            "<Estimate {}: {}, inliers={} of {}, score={:.3}>",
             self.model,
+            self.pose.text(),
             self.inlier_count(),
             self.inliers.len(),
             self.score
@@ -442,7 +420,7 @@ impl Estimate {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
         let state = (
             self.model.clone(),
-            pose_state(&self.pose),
+            self.pose.state(),
             self.covariance.iter().copied().collect(),
             self.inliers.clone(),
             self.score,

@@ -23,8 +23,10 @@ use crate::solve::solver_named;
 /// cameras1, cameras2 : Camera, array_like of shape (3, 3), or a sequence of B of them, optional
 ///     The cameras of all pairs, or of each. ``cameras2`` is ``cameras1`` where absent.
 /// threshold, confidence, min_iterations, max_iterations, seed, solver
-///     As for ``estimate``. Every pair gets the answer that ``estimate`` gives for it with the same seed, whatever the
-///     number of threads and however pairs are divided into batches.
+///     As for ``estimate``.
+/// first_index : int
+///     Pair ``i`` gets the answer that ``estimate`` gives for it with the same seed and ``index=first_index + i``, whatever
+///     the number of threads. A batch that is a part of a larger one begins with the index of its first pair there.
 /// num_threads : int
 ///     How many threads to use, all of the machine's for 0.
 ///
@@ -40,7 +42,7 @@ use crate::solve::solver_named;
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, offsets, cameras1=None, cameras2=None, *, threshold=None, confidence=0.9999, min_iterations=300,
-    max_iterations=100_000, seed=0, solver=None, num_threads=0
+    max_iterations=100_000, seed=0, first_index=0, solver=None, num_threads=0
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn estimate_batch(
@@ -55,6 +57,7 @@ pub(crate) fn estimate_batch(
     min_iterations: usize,
     max_iterations: usize,
     seed: u64,
+    first_index: u64,
     solver: Option<&str>,
     num_threads: usize,
 ) -> PyResult<EstimateBatch> {
@@ -71,8 +74,9 @@ pub(crate) fn estimate_batch(
         (first, second) => first.map(|first| (first.clone(), second.unwrap_or(first))),
     };
     let threshold = threshold_for(cameras.is_some(), threshold)?;
-    let options =
-        Options { threshold, confidence, min_iterations, max_iterations, seed, solver, ..Options::default() };
+    let index = first_index;
+    let numbers = Options { confidence, min_iterations, max_iterations, seed, index, ..Options::default() };
+    let options = Options { threshold, solver, ..numbers };
     py.detach(|| {
         let matches = matches(&x1, &x2, &offsets, cameras.as_ref())?;
         let problems: Vec<_> = (0..pairs)

@@ -7,9 +7,11 @@ mod candidate;
 mod errors;
 mod estimate;
 mod estimate_batch;
+mod pose;
 mod servo;
 mod solve;
 mod solve_batch;
+mod third_view;
 
 use pyo3::pymodule;
 
@@ -34,6 +36,8 @@ mod _core {
     use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
+    #[pymodule_export]
+    use crate::third_view::_third_view;
 
     #[pymodule_export]
     use crate::solve_batch::_solve_batch;

@@ -166,7 +166,7 @@ def test_batch() -> None:
     assert found.model[6] is None
     assert "3 matches" in str(found.reason[6])
     for i, (a, b) in enumerate(zip(offsets[:6], offsets[1:], strict=False)):
-        one = qp.estimate(x1[a:b], x2[a:b], K, seed=5)
+        one = qp.estimate(x1[a:b], x2[a:b], K, seed=5, index=i)
         np.testing.assert_array_equal(found.R[i], one.R)
         np.testing.assert_array_equal(found.t[i], one.t)
         np.testing.assert_array_equal(found.quat_wxyz[i], one.quat_wxyz)
@@ -180,6 +180,63 @@ def test_batch() -> None:
     for threads in [1, 2, 5]:
         assert qp.estimate_batch(x1, x2, offsets, [K] * 7, [CAMERA] * 7, seed=5, num_threads=threads) == found
     assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_batch_of_batches() -> None:
+    x1, x2, offsets = batch()
+    found = qp.estimate_batch(x1, x2, offsets, K, seed=5)
+    a, rest = offsets[3], [o - offsets[3] for o in offsets[3:]]
+    first = qp.estimate_batch(x1[:a], x2[:a], offsets[:4], K, seed=5)
+    second = qp.estimate_batch(x1[a:], x2[a:], rest, K, seed=5, first_index=3)
+    np.testing.assert_array_equal(np.concatenate([first.R, second.R]), found.R)
+    np.testing.assert_array_equal(np.concatenate([first.iterations, second.iterations]), found.iterations)
+    # Without the index the same pairs get other samples.
+    other = qp.estimate_batch(x1[a:], x2[a:], rest, K, seed=5)
+    assert not np.array_equal(other.R, second.R)
+
+
+def test_degenerate() -> None:
+    s = np.arange(20.0)[:, None]
+    line = [100.0, 200.0] + s * [30.0, 10.0]
+    other = [150.0, 300.0] + s * [20.0, 10.0] + s**2 * [1.0, 0.5]
+    rng = np.random.default_rng(8)
+    noise = rng.normal(0, 0.3, (2, *line.shape))
+    for u1, u2, word in [
+        (line, other, "line"),
+        (line + noise[0], other + noise[1], "line"),
+        (line[:5], other[:5], "line"),
+        (line, line * 0 + 300.0, "coincide"),
+        (line[[0, 1, 2] * 5], other[[0, 1, 2] * 5], "repeated"),
+    ]:
+        with pytest.raises(qp.DegenerateInput, match=word):
+            qp.estimate(u1, u2, K)
+    # On a line in view 1, anywhere in view 2.
+    with pytest.raises(qp.NoPose):
+        qp.estimate(line, rng.uniform(0, 800, line.shape), K)
+
+
+def test_third_view() -> None:
+    right, alone = 0, 0
+    for seed in range(6):
+        scene = make_scene(20 + seed, 80, planar=True)
+        other = make_scene(40 + seed, 80)
+        X3 = scene.X1 @ other.R.T + other.t
+        u3 = X3[:, :2] / X3[:, 2:] * 1060 + [514, 384]
+        u1, u2, _ = with_outliers(scene, 0.0, seed, noise=0.2)
+        found = qp.third_view(u1, u2, u3, K)
+        errors = [rotation_error(e.R, scene.R) for e in (found.estimate_21, qp.estimate(u1, u2, K))]
+        right += errors[0] < 1
+        alone += errors[1] < 1
+        assert rotation_error(found.estimate_31.R, other.R) < 1
+        assert found.disagreement is not None
+        assert found.next_best is not None
+        assert found.disagreement <= found.next_best
+        ratio = np.linalg.norm(other.t) / np.linalg.norm(scene.t)
+        np.testing.assert_allclose(found.ratio, ratio, rtol=0.1)
+    assert right == 6
+    assert alone <= right
+    with pytest.raises(qp.ShapeMismatch):
+        qp.third_view(u1, u2, u3[:5], K)
 
 
 def test_bad_batches() -> None:

@@ -1,24 +1,34 @@
 //! Every solver from outside: one list of laws, one line a solver.
 //!
-//! Against the literal method of section 7.1, against planted truth, under the symmetries of the problem, and against
-//! each other.
+//! Against planted truth, under the symmetries of the problem, with bad input, against the literal method of section 7.1,
+//! and against each other.
 #![expect(clippy::unwrap_used, reason = "laws are tests, and fail as tests do")]
 
 mod agreement;
+mod bad_input;
 mod candidates;
 mod planted;
 mod symmetries;
 
 use nalgebra::UnitQuaternion;
-use quest_core::simulate::{SceneOptions, View};
+use quest_core::simulate::{Layout, SceneOptions, View};
 use quest_core::solver::{Kinds, SolverName};
-use quest_core::{Candidate, Candidates, Correspondence, RelativePose};
+use quest_core::{Candidate, CandidateKind, Candidates, Correspondence, RelativePose};
 use quest_tests::scenes::solve;
 use quest_tests::solution_sets::nearest;
 
-/// A solver under test, and what it is known not to find.
+/// A solver under test, and what it is known not to do: of the five-point solvers every solution comes to rounding, and
+/// what else is lost is counted and bounded, at about twice what was found.
+#[derive(Clone, Copy)]
 struct Subject {
     solver: SolverName,
+    /// The scenes that it is made for.
+    scenes: SceneOptions,
+    /// How many of 10,000 true poses without noise it may lose, over all angles and in realistic scenes.
+    most_lost: [usize; 2],
+    /// How many of 1,000 noisy problems may have other solutions after a change that should not matter, in number or
+    /// by more than [`SAME`]: those with nearly double ones.
+    most_different: usize,
     /// The smallest parallax at which it finds the true pose.
     smallest_parallax: f64,
     /// Scenes with little parallax of which it misses the true pose, out of 1,000 at each of eight parallaxes. In 391
@@ -28,12 +38,29 @@ struct Subject {
 }
 
 impl Subject {
-    fn exact(&self, matches: &[Correspondence]) -> Candidates {
-        solve(self.solver, Kinds::Exact, matches)
+    fn new(solver: SolverName) -> Self {
+        Self {
+            solver,
+            scenes: SceneOptions { points: solver.info().min_matches, ..SceneOptions::default() },
+            most_lost: [0, 0],
+            most_different: 0,
+            smallest_parallax: f64::INFINITY,
+            missed_at_small_parallax: &[],
+        }
     }
 
-    fn all(&self, matches: &[Correspondence]) -> Candidates {
-        solve(self.solver, Kinds::All, matches)
+    fn solve(&self, kinds: Kinds, matches: &[Correspondence]) -> Candidates {
+        solve(self.solver, kinds, matches)
+    }
+
+    fn exact(&self, matches: &[Correspondence]) -> Vec<RelativePose> {
+        exact_poses(&self.solve(Kinds::Exact, matches))
+    }
+
+    /// Its scenes over all angles, and as a camera sees them.
+    fn views(&self) -> [SceneOptions; 2] {
+        let SceneOptions { layout, points, .. } = self.scenes;
+        [self.scenes, SceneOptions { layout, points, ..SceneOptions::realistic() }]
     }
 }
 
@@ -41,7 +68,8 @@ impl Subject {
 macro_rules! laws {
     ($module:ident: $subject:expr; $($file:ident::$law:ident,)*) => {
         mod $module {
-            use super::{SolverName, Subject, View};
+            #[allow(clippy::allow_attributes, unused_imports, reason = "most subjects need a few of them")]
+            use super::{Layout, SceneOptions, SolverName, Subject, View};
             $(
                 #[test]
                 fn $law() {
@@ -50,50 +78,82 @@ macro_rules! laws {
             )*
         }
     };
-    ($module:ident: $subject:expr) => {
+    (any $module:ident: $subject:expr; $($file:ident::$law:ident,)*) => {
         laws! { $module: $subject;
-            candidates::exact_candidates_are_the_real_solutions_of_section_7_1,
-            candidates::candidates_satisfy_the_quartics,
-            candidates::exact_candidates_fit_to_rounding,
-            candidates::every_kind_keeps_the_exact_candidates,
-            candidates::points_in_front_are_counted,
-            candidates::solving_twice_gives_the_same_bits,
-            candidates::rotations_far_from_each_other_are_told_apart,
-            planted::planted_general_and_coplanar_scenes_are_found,
-            planted::planted_half_turns_are_found,
-            planted::planted_pure_translations_are_found,
-            planted::twisted_partners_at_q1_zero_are_found,
-            planted::the_length_of_t_is_the_parallax,
-            planted::more_than_five_noise_free_matches_give_the_truth,
+            planted::true_poses_are_found,
+            planted::more_matches_find_the_truth,
             symmetries::the_order_of_the_matches_does_not_matter,
-            symmetries::rotating_a_camera_rotates_the_solutions,
+            symmetries::rotating_the_cameras_rotates_the_poses,
             symmetries::exchanging_the_views_inverts_the_poses,
             symmetries::the_length_of_bearings_does_not_matter_to_the_rotation,
+            candidates::candidates_are_finite_and_ranked,
+            candidates::a_used_list_is_emptied_first,
+            candidates::points_in_front_are_counted,
+            candidates::noise_moves_the_pose_a_little,
+            bad_input::bad_input_has_its_reason,
+            bad_input::coarse_points_give_finite_candidates,
+            bad_input::pure_rotations_are_named,
+            $($file::$law,)*
         }
+    };
+    (five_point $module:ident: $subject:expr; $($file:ident::$law:ident,)*) => {
+        laws! { any $module: $subject;
+            planted::coplanar_scenes_are_found,
+            planted::half_turns_are_found,
+            planted::pure_translations_are_found,
+            planted::twisted_partners_at_q1_zero_are_found,
+            candidates::exact_candidates_are_the_real_solutions_of_section_7_1,
+            candidates::exact_candidates_satisfy_the_quartics,
+            candidates::exact_candidates_fit_to_rounding,
+            $($file::$law,)*
+        }
+    };
+    (any $module:ident: $subject:expr) => { laws! { any $module: $subject; } };
+    (five_point $module:ident: $subject:expr) => { laws! { five_point $module: $subject; } };
+    (parallax_safe $module:ident: $subject:expr) => {
+        laws! { five_point $module: $subject; planted::the_length_of_t_is_the_parallax, }
     };
 }
 
-laws!(quest: Subject {
-    solver: SolverName::Quest,
+laws!(parallax_safe quest: Subject {
     smallest_parallax: 1e-8,
     missed_at_small_parallax: &[(View::Everywhere, 391), (View::Everywhere, 776)],
+    ..Subject::new(SolverName::Quest)
 });
-laws!(quest_eigen: Subject {
-    solver: SolverName::QuestEigen,
+laws!(parallax_safe quest_eigen: Subject {
     smallest_parallax: 1e-8,
     missed_at_small_parallax: &[(View::Everywhere, 391), (View::Everywhere, 476)],
+    ..Subject::new(SolverName::QuestEigen)
 });
-laws!(relinearization: Subject {
-    solver: SolverName::Relinearization,
+laws!(parallax_safe relinearization: Subject {
     // At 1e-8 it misses one in twenty.
     smallest_parallax: 1e-7,
     missed_at_small_parallax: &[(View::Everywhere, 9), (View::Everywhere, 391)],
+    ..Subject::new(SolverName::Relinearization)
+});
+laws!(five_point nister: Subject::new(SolverName::Nister));
+laws!(five_point stewenius: Subject::new(SolverName::Stewenius));
+laws!(five_point li_hartley: Subject::new(SolverName::LiHartley));
+laws!(five_point kukelova: Subject::new(SolverName::Kukelova));
+laws!(five_point kneip: Subject::new(SolverName::Kneip));
+laws!(any eight_point: Subject {
+    most_lost: [1, 1],
+    most_different: 1,
+    ..Subject::new(SolverName::EightPoint)
+});
+laws!(any homography: Subject {
+    scenes: SceneOptions { points: 4, layout: Layout::Coplanar, ..SceneOptions::default() },
+    most_lost: [1, 1],
+    most_different: 6,
+    ..Subject::new(SolverName::Homography)
 });
 
 const SEED_LITERAL: u64 = 100;
 const SEED_PLANTED: u64 = 101;
 const SEED_SYMMETRIES: u64 = 102;
 const SEED_PARALLAX: u64 = 103;
+const SEED_NOISY: u64 = 105;
+const SEED_DEGENERATE: u64 = 106;
 
 /// Two sets of solutions of the same problem agree this well, in radians. Rounding is magnified by the nearness of
 /// other solutions; in 2,000 problems with 0.75 px of noise no two of 18,104 solutions came close enough to matter.
@@ -106,9 +166,32 @@ fn noisy(base: SceneOptions) -> SceneOptions {
     SceneOptions { noise_px: 0.75, ..base }
 }
 
+fn exact_poses(candidates: &Candidates) -> Vec<RelativePose> {
+    candidates.iter().filter(|c| c.kind == CandidateKind::Exact).map(|c| c.pose).collect()
+}
+
+fn rotations(poses: &[RelativePose]) -> Vec<UnitQuaternion<f64>> {
+    poses.iter().map(|pose| pose.q_21).collect()
+}
+
 /// The same number of rotations, each with one of the other set within [`SAME`].
 fn same_rotations(a: &[UnitQuaternion<f64>], b: &[UnitQuaternion<f64>]) -> bool {
     a.len() == b.len() && a.iter().all(|q| nearest(q, b) < SAME) && b.iter().all(|q| nearest(q, a) < SAME)
+}
+
+/// The larger of the angles between the rotations and between the lines of translation, to the nearest of some poses.
+fn distance(pose: &RelativePose, among: &[RelativePose]) -> f64 {
+    let to = |other: &RelativePose| {
+        let sine = pose.t_21.normalize().cross(&other.t_21.normalize()).norm();
+        pose.rotation_error(other).max(sine)
+    };
+    among.iter().map(to).fold(f64::INFINITY, f64::min)
+}
+
+/// The same number of poses, each with one of the other set within [`SAME`].
+fn same_poses(a: &[RelativePose], b: &[RelativePose]) -> bool {
+    let within = |a: &[RelativePose], b: &[RelativePose]| a.iter().all(|pose| distance(pose, b) < SAME);
+    a.len() == b.len() && within(a, b) && within(b, a)
 }
 
 fn closest<'a>(candidates: &'a Candidates, pose: &RelativePose) -> Option<&'a Candidate> {

@@ -69,10 +69,13 @@ fn over_time(frames: &[FrameRecord], value: impl Fn(&FrameRecord) -> Option<f64>
 /// What is compared: a method, where its pose is, and how it is drawn.
 type Method = (&'static str, fn(&FrameRecord) -> Option<&Pose>, Style);
 
+/// The pose that the commands are based on, whichever solver it is from.
+const LOOP: &str = "the loop";
+
 const METHODS: [Method; 3] = [
     ("essential", |f| f.essential.as_ref(), Style::Dashed),
     ("homography", |f| f.homography.as_ref(), Style::Line),
-    ("quest", |f| f.estimate.as_ref(), Style::Thick),
+    (LOOP, |f| f.estimate.as_ref(), Style::Thick),
 ];
 
 /// Each component of each method, in the component's colour.
@@ -91,7 +94,7 @@ fn components(
             if points.iter().all(|p| p[1].is_nan()) {
                 continue;
             }
-            let label = if method == "quest" { (*name).to_owned() } else { String::new() };
+            let label = if method == LOOP { (*name).to_owned() } else { String::new() };
             let series = Series::line(format!("{name}, {method}"), points);
             panel = panel.with(series.coloured(colour::nth(k)).styled(style).labelled(label));
         }
@@ -114,7 +117,11 @@ fn lengths(frames: &[FrameRecord]) -> Panel {
     METHODS.iter().fold(panel, |panel, (name, pose, style)| {
         let Some(first) = frames.iter().find_map(pose).map(length).filter(|l| *l > 0.0) else { return panel };
         let points = over_time(frames, |f| pose(f).map(|p| length(p) / first));
-        let solver = if *name == "essential" { "stewenius" } else { name };
+        let solver = match *name {
+            "essential" => "stewenius",
+            LOOP => "quest",
+            solver => solver,
+        };
         panel.with(Series::line(*name, points).coloured(colour::of_solver(solver)).styled(*style))
     })
 }

@@ -7,12 +7,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use quest_core::{
-    Candidate, Candidates, InputError,
+    Candidate, Candidates,
     solver::{Kinds, SolverName},
 };
 use quest_io::{Output, Pair, SolveRecord};
 
-use crate::{Failure, Outcome, input::InputOptions, options::solver_parser, words};
+use crate::{Failure, Outcome, input::InputOptions, options::solver_parser, solve, words};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -21,7 +21,8 @@ Examples:
 
 The page shows both cameras, rays, and points at their depths in the frame of camera 1, each
 candidate to be switched on and off, and the residuals. It is one file of 5 MB that works without
-a network. Files are those of `quest-cli solve`; of JSON Lines the first pair is shown.
+a network. Files are those that `quest-cli solve` and `estimate` read, not their results, which have no
+matches; of JSON Lines the first pair is shown.
 
 Exit status: 0 a page, 1 no pose could be found, 2 bad input or arguments.";
 
@@ -65,28 +66,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if input.is_lines() && !arguments.quiet && input.next()?.is_some() {
         words::say("note", &format!("{}: only this pair is shown", pair.place));
     }
-    let matches = pair.correspondences()?;
+    let matches = solve::enough_matches(&pair, arguments.solver)?;
     let info = arguments.solver.info();
-    if matches.len() < info.min_matches {
-        let error = InputError::TooFewMatches { found: matches.len(), needed: info.min_matches };
-        return Err(pair.refuse(error).into());
-    }
     let mut found = Candidates::new();
     arguments.solver.solve(Kinds::All, &matches, &mut found);
-    let most = found.iter().map(|c| c.in_front).max().unwrap_or(0);
     let is_shown = |c: &&Candidate| arguments.all || c.in_front == matches.len();
     let candidates: Vec<Candidate> = found.iter().filter(is_shown).copied().collect();
     if candidates.is_empty() {
-        let why = match found.degeneracy() {
-            Some(degeneracy) if found.is_empty() => degeneracy.to_string(),
-            _ if found.is_empty() => "the solver found no candidate".to_owned(),
-            _ => format!(
-                "no candidate has all {} points in front of both cameras, the best has {most}; --all shows them",
-                matches.len()
-            ),
-        };
-        words::say("no pose", &format!("{}: {why}", pair.place));
-        return Ok(Outcome::NoPose);
+        return Ok(solve::no_pose(&pair, &found, matches.len()));
     }
     let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
     if !arguments.all {

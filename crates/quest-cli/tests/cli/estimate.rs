@@ -157,3 +157,105 @@ fn tables_and_rows() {
     assert_eq!(rows[0].split(',').count(), rows[1].split(',').count());
     assert!(rows[0].starts_with("pair,name,model,qw"));
 }
+
+/// Twenty points on a line in view 1, and where `view2` takes them.
+fn on_a_line(view2: impl Fn(f64) -> [f64; 2]) -> Value {
+    let mut line = pair([0.5, 0.1, -0.2], 1, false);
+    let matches: Vec<_> = (0..20)
+        .map(|i| {
+            let s = f64::from(i);
+            let [u2, v2] = view2(s);
+            [100.0 + 30.0 * s, 200.0 + 10.0 * s, u2, v2]
+        })
+        .collect();
+    line["matches"] = json!(matches);
+    line
+}
+
+#[test]
+fn matches_that_determine_no_pose_are_refused_with_the_reason() {
+    let both = on_a_line(|s| [150.0 + 20.0 * s + s * s, 300.0 + 10.0 * s + 0.5 * s * s]);
+    let same = on_a_line(|_| [400.0, 300.0]);
+    for (degenerate, reason) in [(&both, "lie on a line"), (&same, "coincide")] {
+        let (run, _) = estimated(degenerate, &[]);
+        assert_eq!((run.status, run.stdout.as_str()), (2, ""), "{reason}");
+        assert!(run.stderr.contains(reason), "{}", run.stderr);
+    }
+    // On a line in view 1, anywhere in view 2.
+    let (run, result) = estimated(&on_a_line(|s| [(s * 337.0) % 1000.0, (s * 253.0) % 800.0]), &[]);
+    assert_eq!((run.status, &result["model"], &result["q_21"]), (1, &Value::Null, &Value::Null));
+    // Among lines they are no reason to stop.
+    let lines = format!("{both}\n{}\n", pair([0.5, 0.1, -0.2], 60, false));
+    let run = run_in(Path::new("."), &["estimate", "-"], lines.as_bytes());
+    let results: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((run.status, results.len()), (1, 2));
+    assert_eq!((&results[0]["model"], &results[0]["q_21"]), (&json!("degenerate"), &Value::Null));
+    assert!(results[0]["reason"].as_str().unwrap().contains("line"));
+    assert_eq!(results[1]["model"], "general");
+}
+
+#[test]
+fn lines_keep_their_order_and_have_random_numbers_of_their_own() {
+    let noisy = pair([0.5, 0.1, -0.2], 60, true);
+    let lines: Vec<_> = (0..40)
+        .map(|i| {
+            let mut line = if i % 7 == 0 { pair([0.5, 0.1, -0.2], 300, true) } else { noisy.clone() };
+            line["name"] = json!(format!("pair {i}"));
+            line.to_string()
+        })
+        .collect();
+    let run = run_in(Path::new("."), &["estimate", "-"], lines.join("\n").as_bytes());
+    let results: Vec<Value> = run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((run.status, results.len()), (0, 40));
+    for (i, result) in results.iter().enumerate() {
+        assert_eq!(result["name"], format!("pair {i}"));
+    }
+    // The first line is what the pair alone gives.
+    let (_, alone) = estimated(&pair([0.5, 0.1, -0.2], 300, true), &[]);
+    assert_eq!(results[0]["t_21"], alone["t_21"]);
+}
+
+#[test]
+fn a_third_view_decides_between_the_poses_of_a_plane() {
+    // Points of a slanted plane, seen by cameras that were moved by t.
+    let seen = |t: [f64; 3], order: &dyn Fn(u32) -> u32| {
+        let mut views = pair(t, 1, false);
+        let matches: Vec<_> = (0..50)
+            .map(|i| {
+                let f = |a: f64| (f64::from(order(i)) * a).fract() - 0.5;
+                let (x, y) = (2.0 * f(0.618_034), 1.6 * f(0.754_878));
+                let x1 = [x, y, 4.0 + 0.5 * x - 0.3 * y];
+                let pixel = |x: [f64; 3]| [1000.0 * x[0] / x[2] + 500.0, 1000.0 * x[1] / x[2] + 400.0];
+                let (u1, u2) = (pixel(x1), pixel([x1[0] + t[0], x1[1] + t[1], x1[2] + t[2]]));
+                [u1[0], u1[1], u2[0], u2[1]]
+            })
+            .collect();
+        views["matches"] = json!(matches);
+        views
+    };
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("12.json"), seen([0.4, 0.1, -0.3], &|i| i).to_string()).unwrap();
+    fs::write(folder.path().join("13.json"), seen([-0.3, 0.3, 0.2], &|i| 60 - i).to_string()).unwrap();
+    let with = |format: &str| {
+        run_in(folder.path(), &["estimate", "12.json", "--third", "13.json", "--format", format], b"")
+    };
+    let run = with("json");
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    let result: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(result["model"], "planar");
+    assert!(result["rotation_error_deg"].as_f64().unwrap() < 0.01, "{result}");
+    let third = &result["third_view"];
+    assert!(third["disagreement"].as_f64().unwrap() < 0.1, "{third}");
+    assert!((third["q_31"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
+    // |(−0.3, 0.3, 0.2)| / |(0.4, 0.1, −0.3)| = √(22/26)
+    assert!((third["ratio"].as_f64().unwrap() - (22.0_f64 / 26.0).sqrt()).abs() < 0.01, "{third}");
+    assert!(with("table").stdout.contains("third view"));
+
+    let lines =
+        run_in(folder.path(), &["estimate", "-", "--input-format", "jsonl", "--third", "13.json"], b"");
+    assert_eq!(lines.status, 2);
+    assert!(lines.stderr.contains("--third"), "{}", lines.stderr);
+    let missing = run_in(folder.path(), &["estimate", "12.json", "--third", "14.json"], b"");
+    assert_eq!(missing.status, 2);
+    assert!(missing.stderr.contains("14.json"), "{}", missing.stderr);
+}

@@ -14,14 +14,10 @@ pub(crate) fn shortest_directions<const R: usize, const C: usize, const K: usize
         std::array::from_fn(|k| std::array::from_fn(|i| ((1 + i + 3 * k * (i + 2)) as f64).sin()));
     let inverse = inverse_diagonal(a);
     for _ in 0..STEPS {
-        for x in &mut basis {
-            solve_transposed(a, &inverse, x);
-        }
+        solve_transposed(a, &inverse, &mut basis);
         // In between as well: one direction may grow by 1e16, and what is left of another must not drown in its rounding.
         orthonormalise(&mut basis);
-        for x in &mut basis {
-            solve(a, &inverse, x);
-        }
+        solve(a, &inverse, &mut basis);
         orthonormalise(&mut basis);
     }
     basis
@@ -66,25 +62,41 @@ fn inverse_diagonal<const R: usize, const C: usize>(r: &[[f64; C]; R]) -> [f64; 
     std::array::from_fn(|k| 1.0 / if r[k][k].abs() < rounding { rounding } else { r[k][k] })
 }
 
-/// Solves `Rᵀ y = x`.
-fn solve_transposed<const R: usize, const C: usize>(r: &[[f64; C]; R], inverse: &[f64; C], x: &mut [f64; C]) {
-    for k in 0..C {
-        let y = x[k] * inverse[k];
-        x[k] = y;
-        for (x, a) in x[k + 1..].iter_mut().zip(&r[k][k + 1..]) {
-            *x -= a * y;
+/// Solves `Rᵀ y = x` for every `x`.
+fn solve_transposed<const R: usize, const C: usize, const K: usize>(
+    r: &[[f64; C]; R],
+    inverse: &[f64; C],
+    basis: &mut [[f64; C]; K],
+) {
+    for x in basis {
+        for k in 0..C {
+            let y = x[k] * inverse[k];
+            x[k] = y;
+            for (x, a) in x[k + 1..].iter_mut().zip(&r[k][k + 1..]) {
+                *x -= a * y;
+            }
         }
     }
 }
 
-/// Solves `R y = x`.
-fn solve<const R: usize, const C: usize>(r: &[[f64; C]; R], inverse: &[f64; C], x: &mut [f64; C]) {
+/// Solves `R y = x` for every `x`: side by side, as sums along a row wait for each other.
+fn solve<const R: usize, const C: usize, const K: usize>(
+    r: &[[f64; C]; R],
+    inverse: &[f64; C],
+    basis: &mut [[f64; C]; K],
+) {
+    let mut solved = [[0.0; K]; C];
     for k in (0..C).rev() {
-        let mut sum = x[k];
-        for (a, y) in r[k][k + 1..].iter().zip(&x[k + 1..]) {
-            sum -= a * y;
+        let mut sums: [f64; K] = std::array::from_fn(|n| basis[n][k]);
+        for (a, y) in r[k][k + 1..].iter().zip(&solved[k + 1..]) {
+            for (sum, y) in sums.iter_mut().zip(y) {
+                *sum -= a * y;
+            }
         }
-        x[k] = sum * inverse[k];
+        solved[k] = sums.map(|sum| sum * inverse[k]);
+        for (x, y) in basis.iter_mut().zip(&solved[k]) {
+            x[k] = *y;
+        }
     }
 }
 
@@ -94,22 +106,34 @@ fn orthonormalise<const C: usize, const K: usize>(basis: &mut [[f64; C]; K]) {
         let (done, rest) = basis.split_at_mut(k);
         let x = &mut rest[0];
         for _ in 0..2 {
-            let norm = x.iter().map(|a| a * a).sum::<f64>().sqrt();
-            for a in x.iter_mut() {
-                *a /= norm;
-            }
+            normalise(x);
             for y in done.iter() {
-                let dot: f64 = x.iter().zip(y).map(|(a, b)| a * b).sum();
+                let along = dot(x, y);
                 for (a, b) in x.iter_mut().zip(y) {
-                    *a -= dot * b;
+                    *a -= along * b;
                 }
             }
         }
-        let norm = x.iter().map(|a| a * a).sum::<f64>().sqrt();
-        for a in x {
-            *a /= norm;
+        normalise(x);
+    }
+}
+
+fn normalise<const C: usize>(x: &mut [f64; C]) {
+    let inverse = 1.0 / dot(x, x).sqrt();
+    for a in x {
+        *a *= inverse;
+    }
+}
+
+/// In four sums that do not wait for each other.
+fn dot<const C: usize>(x: &[f64; C], y: &[f64; C]) -> f64 {
+    let mut sums = [0.0; 4];
+    for (a, b) in x.chunks(4).zip(y.chunks(4)) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
         }
     }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Samples in, essential matrices out.
 
-use super::cubics::cubics;
+use super::cubics::{self, Cubics};
 use super::elimination::reduce;
 use super::essentials::Essentials;
 use super::frame::{Frame, frame};
@@ -10,7 +10,7 @@ use super::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLane
 use super::motion::Motion;
 use super::null_space::{Basis, null_space};
 use super::resultant::Resultant;
-use super::roots::{self, MAX_ROOTS, Root, Tables};
+use super::roots::{self, Cells, Grid, MAX_ROOTS, Root, Tables};
 use super::twice::{Twice, TwiceLanes, twice};
 use crate::solver::{Kinds, PoseSolver, Quest};
 use crate::{Candidates, Correspondence};
@@ -155,11 +155,12 @@ impl Batch<'_> {
     fn solve<L: WordLanes>(self, lanes: L) -> Result<(), SampleError> {
         let tables = Tables::get();
         let mut bearings: Bearings = [[[0.0; MAX_LANES]; 15]; 2];
+        let mut space = Space { cubics: Cubics::new(lanes), grid: Grid::new(), cells: Cells::new() };
         let mut found = Found::new();
         for (group, samples) in self.samples.chunks(L::COUNT).enumerate() {
             gather::<L>(self.matches, samples, &mut bearings)
                 .map_err(|error| SampleError { sample: error.sample + group * L::COUNT, ..error })?;
-            solve_group(lanes, tables, self.tolerance, &bearings, &mut found);
+            solve_group(lanes, tables, self.tolerance, &bearings, &mut space, &mut found);
             for lane in 0..samples.len() {
                 self.out.push_sample(found.is_complete[lane], found.of(lane));
             }
@@ -229,10 +230,16 @@ const SMALL_PIVOT: f64 = 1e-8;
 
 /// The last of Newton's steps, squared. Their convergence is quadratic.
 const SHORT_STEP: f64 = 1e-14;
+/// A step longer than this, squared, may lead to another solution: the root was a poor one.
+const LONG_STEP: f64 = 1e-4;
 const MAX_NEWTON_STEPS: usize = 7;
-/// The last step to a root, with and without Newton's iteration to follow.
-const ROOT_BEFORE_NEWTON: f64 = 1e-8;
-const ROOT: f64 = 1e-6;
+
+/// What the stages write to, large enough to be worth keeping from group to group.
+struct Space<L: Lanes<f64>> {
+    cubics: Cubics<L>,
+    grid: Grid,
+    cells: Cells,
+}
 
 /// The stages, from bearings to essential matrices.
 #[inline(always)]
@@ -241,17 +248,20 @@ fn solve_group<L: WordLanes>(
     tables: &Tables,
     tolerance: Tolerance,
     bearings: &Bearings,
+    space: &mut Space<L>,
     found: &mut Found,
 ) {
     let a = load(lanes, &bearings[0]);
     let b = load(lanes, &bearings[1]);
     let (frame, mut rows) = frame(lanes, &a, &b);
     let (basis, independence) = null_space(lanes, &mut rows);
-    let (reduced, pivot) = reduce(lanes, &cubics(lanes, &basis, frame.parallax));
+    cubics::fill(lanes, &basis, frame.parallax, &mut space.cubics);
+    let (reduced, pivot) = reduce(lanes, &mut space.cubics.columns);
     let resultant = Resultant::<L>::new(lanes, &reduced);
     let polynomial = resultant.polynomial(lanes);
     let mirrored = roots::mirrored::<L>(&polynomial);
-    let cells = roots::isolate(lanes, tables, &polynomial, &mirrored);
+    let cells = &mut space.cells;
+    roots::isolate(lanes, tables, &polynomial, &mirrored, &mut space.grid, cells);
     let count = lanes.load(&cells.count.map(|n| n as f64));
 
     let mut is_complete = lanes.splat(NO_PARALLAX).less(frame.parallax);
@@ -260,25 +270,19 @@ fn solve_group<L: WordLanes>(
     let difference = (roots::count(lanes, &polynomial) - count).abs();
     is_complete = is_complete.and(difference.less(lanes.splat(0.5)));
 
-    let back = Back {
-        lanes: TwiceLanes(lanes),
-        tolerance,
-        a: [twice(&a[0]), twice(&a[1]), twice(&a[2]), twice(&a[3]), twice(&a[4])],
-        b: [twice(&b[0]), twice(&b[1]), twice(&b[2]), twice(&b[3]), twice(&b[4])],
-        resultant: resultant.twice(),
-        essentials: essential_basis(&frame, &basis),
-    };
+    let essentials = essential_basis(&frame, &basis);
+    let back = Back { lanes, tolerance, a: &a, b: &b, resultant: &resultant, essentials: &essentials };
     found.most = cells.count[..L::COUNT].iter().copied().max().unwrap_or(0).div_ceil(2);
     for (k, pair) in found.pairs[..found.most].iter_mut().enumerate() {
         let slot = Twice(lanes.splat((2 * k) as f64), lanes.splat((2 * k + 1) as f64));
         let is_there = slot.less(Twice(count, count));
-        let accuracy = if tolerance == Tolerance::Tight { ROOT_BEFORE_NEWTON } else { ROOT };
-        let root = roots::refine(lanes, &polynomial, &mirrored, &cells, 2 * k, is_there, accuracy);
+        let root = roots::refine(lanes, &polynomial, &mirrored, cells, 2 * k, is_there);
         let (matrix, is_good) = back.essential(&root, is_there);
         for j in 0..9 {
             matrix[j].store(&mut pair.matrix[j]);
         }
-        let (zero, one) = (back.lanes.splat(0.0), back.lanes.splat(1.0));
+        let twice = TwiceLanes(lanes);
+        let (zero, one) = (twice.splat(0.0), twice.splat(1.0));
         let mut kept = [0.0; 2 * MAX_LANES];
         one.select(is_good.and(is_there), zero).store(&mut kept);
         pair.is_kept = kept.map(|x| x > 0.5);
@@ -291,24 +295,33 @@ fn solve_group<L: WordLanes>(
 }
 
 /// From roots to essential matrices.
-struct Back<L: Lanes<f64>> {
+struct Back<'a, L: Lanes<f64>> {
     lanes: L,
     tolerance: Tolerance,
-    a: [Vector3<L>; 5],
-    b: [Vector3<L>; 5],
-    resultant: Resultant<L>,
-    essentials: [[F<L>; 4]; 9],
+    a: &'a [Vector3<L>; 5],
+    b: &'a [Vector3<L>; 5],
+    resultant: &'a Resultant<L>,
+    essentials: &'a [[F<L>; 4]; 9],
 }
 
-impl<L: Lanes<f64>> Back<L> {
-    /// The essential matrix of a root, and whether it is as accurate as it has to be.
+/// Two numbers for each problem, and two truth values.
+type F2<L> = F<TwiceLanes<L>>;
+type M2<L> = M<TwiceLanes<L>>;
+
+impl<L: Lanes<f64>> Back<'_, L> {
+    /// The essential matrices of two roots, and whether they are as accurate as they have to be.
     #[inline(always)]
-    fn essential(&self, root: &Root<L>, is_there: M<L>) -> ([F<L>; 9], M<L>) {
-        let e = combination::<L>(&self.essentials, &self.resultant.point(root.z, root.w));
+    fn essential(&self, root: &Root<TwiceLanes<L>>, is_there: M2<L>) -> ([F2<L>; 9], M2<L>) {
+        let point = self.resultant.points(root.z, root.w);
+        let mut e = [point[0]; 9];
+        for i in 0..9 {
+            e[i] = dot::<TwiceLanes<L>, 4>(&twice(&self.essentials[i]), &point);
+        }
         match self.tolerance {
             Tolerance::Loop => {
-                let scale = (self.lanes.splat(2.0) / dot::<L, 9>(&e, &e)).sqrt();
-                (scaled::<L, 9>(e, scale), root.is_certain)
+                let square = dot::<TwiceLanes<L>, 9>(&e, &e);
+                let scale = (TwiceLanes(self.lanes).splat(2.0) / square).sqrt();
+                (scaled::<TwiceLanes<L>, 9>(e, scale), root.is_certain)
             }
             Tolerance::Tight => {
                 let (e, is_good) = self.polished(&e, is_there);
@@ -317,24 +330,27 @@ impl<L: Lanes<f64>> Back<L> {
         }
     }
 
-    /// The solution of the constraints near an essential matrix, and whether Newton's iteration has found it.
+    /// The solutions of the constraints near essential matrices, and whether Newton's iteration has found them.
     #[inline(always)]
-    fn polished(&self, e: &[F<L>; 9], is_there: M<L>) -> ([F<L>; 9], M<L>) {
-        let lanes = self.lanes;
+    fn polished(&self, e: &[F2<L>; 9], is_there: M2<L>) -> ([F2<L>; 9], M2<L>) {
+        let lanes = TwiceLanes(self.lanes);
         let short = lanes.splat(SHORT_STEP);
         let mut motion = Motion::new(lanes, e);
         let mut last = lanes.splat(1.0).select(is_there, lanes.splat(0.0));
+        let mut longest = lanes.splat(0.0);
         for _ in 0..MAX_NEWTON_STEPS {
-            let (next, length) = motion.step(lanes, &self.a, &self.b);
+            let (next, length) = motion.step(lanes, |i| [twice(&self.a[i]), twice(&self.b[i])]);
             // A lane that has arrived stays where it is, whatever its neighbours do.
             let active = short.less(last);
             motion = next.select(active, motion);
             last = length.select(active, last);
+            longest = last.select(longest.less(last), longest);
             if !short.less(last).any() {
                 break;
             }
         }
-        (motion.essential(lanes), last.less(short + short))
+        let has_arrived = last.less(short + short).and(longest.less(lanes.splat(LONG_STEP)));
+        (motion.essential(lanes), has_arrived)
     }
 }
 
@@ -351,9 +367,9 @@ fn load<L: Lanes<f64>>(lanes: L, columns: &[[f64; MAX_LANES]; 15]) -> [Vector3<L
 
 /// The essential matrices between the views as given that span the solutions: `([t]× + p S) R0` of each basis vector.
 #[inline(always)]
-fn essential_basis<L: Lanes<f64>>(frame: &Frame<L>, basis: &Basis<L>) -> [[F<TwiceLanes<L>>; 4]; 9] {
+fn essential_basis<L: Lanes<f64>>(frame: &Frame<L>, basis: &Basis<L>) -> [[F<L>; 4]; 9] {
     let (r, p) = (&frame.r0_21, frame.parallax);
-    let mut out = [twice(&basis[0]); 9];
+    let mut out = [basis[0]; 9];
     for m in 0..4 {
         let [t0, t1, t2, xx, yy, zz, xy, xz, yz] = basis.map(|form| form[m]);
         let e = [
@@ -364,19 +380,9 @@ fn essential_basis<L: Lanes<f64>>(frame: &Frame<L>, basis: &Basis<L>) -> [[F<Twi
         for j in 0..3 {
             let column = product::<L>(&e, &[r[0][j], r[1][j], r[2][j]]);
             for i in 0..3 {
-                out[3 * i + j][m] = Twice(column[i], column[i]);
+                out[3 * i + j][m] = column[i];
             }
         }
-    }
-    out
-}
-
-/// `x N1 + y N2 + z N3 + w N4`.
-#[inline(always)]
-fn combination<L: Lanes<f64>>(basis: &[[F<L>; 4]; 9], point: &[F<L>; 4]) -> [F<L>; 9] {
-    let mut out = [point[0]; 9];
-    for i in 0..9 {
-        out[i] = dot::<L, 4>(&basis[i], point);
     }
     out
 }

@@ -4,8 +4,10 @@
 //! accurate. Of the reduced matrix only the rows led by `x²z, x²w, y²z, y²w, xyz, xyw` are used, so that back substitution
 //! stops there.
 //!
-//! Column by column: a column passes through all reflections before it, which keeps it in registers.
+//! A reflection waits for the square root and the division that make it. So the next one is begun first, with the column
+//! that it needs, and meanwhile the other columns, which do not wait for each other, are reflected by this one.
 
+use super::cubics::Column;
 use super::lane::{F, Float, Lanes};
 
 /// The first of the reduced rows that are used.
@@ -13,65 +15,66 @@ const FIRST: usize = 4;
 /// How many rows are used.
 pub(super) const ROWS: usize = 10 - FIRST;
 
-type Column<L> = [F<L>; 10];
-
-/// Reflection `K` is `I − v vᵀ · factor`, with `v` zero ahead of entry `K`.
-struct Reflections<L: Lanes<f64>> {
-    v: [Column<L>; 9],
-    factor: [F<L>; 9],
+/// `I − v vᵀ · factor`, with `v` zero ahead of entry `K`.
+struct Reflection<L: Lanes<f64>, const K: usize> {
+    v: Column<L>,
+    factor: F<L>,
 }
 
-/// Of the columns before `J` the reflections in turn.
-macro_rules! reflect {
-    ($reflections:expr, $x:expr, below $end:expr) => {
-        reflect!(@each $reflections, $x, $end, 0 1 2 3 4 5 6 7 8)
-    };
-    (@each $reflections:expr, $x:expr, $end:expr, $($k:literal)*) => {
-        $(if $k < $end {
-            $reflections.apply::<$k>($x);
-        })*
-    };
-}
-
-impl<L: Lanes<f64>> Reflections<L> {
+impl<L: Lanes<f64>, const K: usize> Reflection<L, K> {
+    /// That which makes zero what is behind entry `K` of a column, which it is applied to.
     #[inline(always)]
-    fn apply<const K: usize>(&self, x: &mut Column<L>) {
-        let v = &self.v[K];
+    fn new(lanes: L, x: &mut Column<L>, pivots: &mut Pivots<L>) -> Self {
+        let mut v = *x;
+        let length = square::<L, K>(x).sqrt();
+        pivots.add(length);
+        x[K] = (-length).select(lanes.splat(0.0).less(x[K]), length);
+        v[K] = v[K] - x[K];
+        Self { v, factor: lanes.splat(-1.0) / (x[K] * v[K]) }
+    }
+
+    #[inline(always)]
+    fn apply(&self, x: &mut Column<L>) {
+        let v = &self.v;
         // Two sums: additions wait for each other.
         let (mut even, mut odd) = (v[K] * x[K], v[K + 1] * x[K + 1]);
         for i in K + 2..10 {
             let sum = if (i - K).is_multiple_of(2) { &mut even } else { &mut odd };
             *sum = v[i].mul_add(x[i], *sum);
         }
-        let dot = (even + odd) * self.factor[K];
-        for i in K..10 {
+        let dot = (even + odd) * self.factor;
+        // Row `K` has no further use where it is ahead of those that are used.
+        let from = if K < FIRST { K + 1 } else { K };
+        for i in from..10 {
             x[i] = dot.neg_mul_add(v[i], x[i]);
         }
     }
 
-    /// Reduces column `J` by the reflections before it, adds that which makes it triangular, and returns it with the pivot.
+    /// Applies it to the columns behind its own, and makes the next.
     #[inline(always)]
-    fn add<const J: usize>(&mut self, lanes: L, m: &[[F<L>; 20]; 10], pivots: &mut Pivots<L>) -> Column<L> {
-        let zero = lanes.splat(0.0);
-        let mut x = column::<L>(m, J);
-        reflect!(self, &mut x, below J);
-        if J == 9 {
-            pivots.add(x[J].abs());
-            return x;
+    fn step<const NEXT: usize>(
+        &self,
+        lanes: L,
+        m: &mut [Column<L>; 20],
+        pivots: &mut Pivots<L>,
+    ) -> Reflection<L, NEXT> {
+        self.apply(&mut m[NEXT]);
+        let next = Reflection::new(lanes, &mut m[NEXT], pivots);
+        for x in &mut m[NEXT + 1..] {
+            self.apply(x);
         }
-        let mut square = x[J] * x[J];
-        for i in J + 1..10 {
-            square = x[i].mul_add(x[i], square);
-        }
-        let length = square.sqrt();
-        pivots.add(length);
-        let image = (-length).select(zero.less(x[J]), length);
-        self.v[J] = x;
-        self.v[J][J] = x[J] - image;
-        self.factor[J] = lanes.splat(-1.0) / (image * self.v[J][J]);
-        x[J] = image;
-        x
+        next
     }
+}
+
+/// The squared length of a column from entry `K` on.
+#[inline(always)]
+fn square<L: Lanes<f64>, const K: usize>(x: &Column<L>) -> F<L> {
+    let mut square = x[K] * x[K];
+    for i in K + 1..10 {
+        square = x[i].mul_add(x[i], square);
+    }
+    square
 }
 
 /// The smallest and the largest pivot.
@@ -85,41 +88,33 @@ impl<L: Lanes<f64>> Pivots<L> {
     }
 }
 
+/// The six rows' coefficients of the ten monomials that are left, and the smallest pivot over the largest. The columns are
+/// overwritten.
 #[inline(always)]
-fn column<L: Lanes<f64>>(m: &[[F<L>; 20]; 10], j: usize) -> Column<L> {
-    let mut x = [m[0][j]; 10];
-    for i in 1..10 {
-        x[i] = m[i][j];
+pub(super) fn reduce<L: Lanes<f64>>(lanes: L, m: &mut [Column<L>; 20]) -> ([[F<L>; 10]; ROWS], F<L>) {
+    let mut pivots = Pivots::<L>(lanes.splat(f64::MAX), lanes.splat(0.0));
+    let first = Reflection::<L, 0>::new(lanes, &mut m[0], &mut pivots);
+    let second = first.step::<1>(lanes, m, &mut pivots);
+    let third = second.step::<2>(lanes, m, &mut pivots);
+    let fourth = third.step::<3>(lanes, m, &mut pivots);
+    let fifth = fourth.step::<4>(lanes, m, &mut pivots);
+    let sixth = fifth.step::<5>(lanes, m, &mut pivots);
+    let seventh = sixth.step::<6>(lanes, m, &mut pivots);
+    let eighth = seventh.step::<7>(lanes, m, &mut pivots);
+    let ninth = eighth.step::<8>(lanes, m, &mut pivots);
+    for x in &mut m[9..] {
+        ninth.apply(x);
     }
-    x
-}
+    pivots.add(m[9][9].abs());
 
-/// The six rows' coefficients of the ten monomials that are left, and the smallest pivot over the largest.
-#[inline(always)]
-pub(super) fn reduce<L: Lanes<f64>>(lanes: L, m: &[[F<L>; 20]; 10]) -> ([[F<L>; 10]; ROWS], F<L>) {
-    let zero = lanes.splat(0.0);
-    let mut reflections = Reflections::<L> { v: [[zero; 10]; 9], factor: [zero; 9] };
-    let mut pivots = Pivots::<L>(lanes.splat(f64::MAX), zero);
-    reflections.add::<0>(lanes, m, &mut pivots);
-    reflections.add::<1>(lanes, m, &mut pivots);
-    reflections.add::<2>(lanes, m, &mut pivots);
-    reflections.add::<3>(lanes, m, &mut pivots);
-    let triangle = [
-        reflections.add::<4>(lanes, m, &mut pivots),
-        reflections.add::<5>(lanes, m, &mut pivots),
-        reflections.add::<6>(lanes, m, &mut pivots),
-        reflections.add::<7>(lanes, m, &mut pivots),
-        reflections.add::<8>(lanes, m, &mut pivots),
-        reflections.add::<9>(lanes, m, &mut pivots),
-    ];
-    let mut inverse = [zero; ROWS];
+    let (triangle, columns) = m[FIRST..].split_at(ROWS);
+    let mut inverse = [lanes.splat(1.0); ROWS];
     for k in 0..ROWS {
-        inverse[k] = lanes.splat(1.0) / triangle[k][FIRST + k];
+        inverse[k] = inverse[k] / triangle[k][FIRST + k];
     }
-    let mut out = [[zero; 10]; ROWS];
-    for j in 0..10 {
-        let mut x = column::<L>(m, 10 + j);
-        reflect!(reflections, &mut x, below 9);
+    let mut out = [[lanes.splat(0.0); 10]; ROWS];
+    for (j, column) in columns.iter().enumerate() {
+        let mut x = *column;
         for k in (0..ROWS).rev() {
             let solved = x[FIRST + k] * inverse[k];
             out[k][j] = solved;

@@ -100,7 +100,7 @@ impl Token {
     #[inline]
     pub(super) fn run<K: Task>(self, task: K) -> K::Output {
         match self {
-            Self::Portable => task.run(Portable::<2>),
+            Self::Portable => task.run(Portable),
             #[cfg(target_arch = "x86_64")]
             Self::Sse2(simd) => task.run(Sse2(simd)),
             #[cfg(target_arch = "x86_64")]

@@ -34,6 +34,7 @@ pub(super) trait WordLanes: Lanes<f64> {
 }
 
 /// A number for each problem. Arithmetic stays in its lane, so that no problem can disturb another.
+#[allow(unreachable_pub, reason = "Rust 1.89 does not see that it is reachable by `Lanes`")]
 pub trait Float<T>:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -52,11 +53,14 @@ pub trait Float<T>:
     fn less(self, other: Self) -> Self::Mask;
     /// `self` where the mask is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
+    /// The sum over all problems.
+    fn sum(self) -> T;
     /// Writes to the beginning of a slice of at least `COUNT` numbers.
     fn store(self, out: &mut [T]);
 }
 
 /// A truth value for each problem.
+#[allow(unreachable_pub, reason = "as `Float`")]
 pub trait Mask: Copy {
     /// Both.
     fn and(self, other: Self) -> Self;

@@ -46,6 +46,10 @@
 //! that needs one is flagged, in less than a hundredth of samples, and left to the scalar solver. No lane looks at another,
 //! so that the result for a sample does not depend on its place, its neighbours or the size of the batch.
 //!
+//! A mask is a truth value for each lane. The groups of samples are padded to whole registers by repeating the last sample; the
+//! roots are taken slot by slot, as many slots as the lane with the most roots needs, and the others compute there with
+//! harmless numbers that are not kept. An iteration ends when no lane needs it any more, and what has arrived does not move.
+//!
 //! The lanes are those of `lane.rs`: `vector.rs` (AVX2, AVX-512) and `sse2.rs` by pulp, `portable.rs` for other processors;
 //! `twice.rs` takes two roots of every sample at once.
 #![expect(

@@ -60,18 +60,20 @@ impl<L: Lanes<f64>> Motion<L> {
         self
     }
 
-    /// One of Newton's steps to the solution of five constraints, and the square of its length (radians).
+    /// One of Newton's steps to the solution of the constraints of five matches, given by their bearings in views 1 and 2, and
+    /// the square of its length (radians).
     #[inline(always)]
-    pub(super) fn step(&self, lanes: L, a: &[Vector3<L>; 5], b: &[Vector3<L>; 5]) -> (Self, F<L>) {
+    pub(super) fn step(&self, lanes: L, bearings: impl Fn(usize) -> [Vector3<L>; 2]) -> (Self, F<L>) {
         let (one, half) = (lanes.splat(1.0), lanes.splat(0.5));
         let t = &self.t;
         let [e1, e2] = tangent_basis(lanes, t);
         let r_21 = rotation(lanes, &self.q_21);
         let mut equations = [[one; 6]; 5];
         for i in 0..5 {
-            let c = product::<L>(&r_21, &a[i]);
-            let n = cross::<L>(&b[i], &c);
-            let g = cross::<L>(&c, &cross::<L>(t, &b[i]));
+            let [a, b] = bearings(i);
+            let c = product::<L>(&r_21, &a);
+            let n = cross::<L>(&b, &c);
+            let g = cross::<L>(&c, &cross::<L>(t, &b));
             equations[i] =
                 [g[0], g[1], g[2], dot::<L, 3>(&n, &e1), dot::<L, 3>(&n, &e2), -dot::<L, 3>(&n, t)];
         }
@@ -116,30 +118,14 @@ fn tangent_basis<L: Lanes<f64>>(lanes: L, t: &Vector3<L>) -> [Vector3<L>; 2] {
 /// The solution of five linear equations, the right-hand sides last, by Householder reflections.
 #[inline(always)]
 fn solve<L: Lanes<f64>>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> [F<L>; 5] {
-    let (zero, one) = (lanes.splat(0.0), lanes.splat(1.0));
-    let mut inverse = [one; 5];
-    for k in 0..5 {
-        let mut square = m[k][k] * m[k][k];
-        for i in k + 1..5 {
-            square = m[i][k].mul_add(m[i][k], square);
-        }
-        let length = square.sqrt();
-        let image = (-length).select(zero.less(m[k][k]), length);
-        m[k][k] = m[k][k] - image;
-        inverse[k] = one / image;
-        let factor = -one / (image * m[k][k]);
-        for j in k + 1..6 {
-            let mut dot = m[k][k] * m[k][j];
-            for i in k + 1..5 {
-                dot = m[i][k].mul_add(m[i][j], dot);
-            }
-            let dot = dot * factor;
-            for i in k..5 {
-                m[i][j] = dot.neg_mul_add(m[i][k], m[i][j]);
-            }
-        }
-    }
-    let mut x = [zero; 5];
+    let inverse = [
+        eliminate::<L, 0>(lanes, m),
+        eliminate::<L, 1>(lanes, m),
+        eliminate::<L, 2>(lanes, m),
+        eliminate::<L, 3>(lanes, m),
+        lanes.splat(1.0) / m[4][4],
+    ];
+    let mut x = [lanes.splat(0.0); 5];
     for k in (0..5).rev() {
         let mut sum = m[k][5];
         for j in k + 1..5 {
@@ -148,4 +134,30 @@ fn solve<L: Lanes<f64>>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> [F<L>; 5] {
         x[k] = sum * inverse[k];
     }
     x
+}
+
+/// Makes zero what stands below the diagonal in column `K`, for the columns behind it, and returns the inverse of what is then on
+/// the diagonal.
+#[inline(always)]
+fn eliminate<L: Lanes<f64>, const K: usize>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> F<L> {
+    let one = lanes.splat(1.0);
+    let mut square = m[K][K] * m[K][K];
+    for i in K + 1..5 {
+        square = m[i][K].mul_add(m[i][K], square);
+    }
+    let length = square.sqrt();
+    let image = (-length).select(lanes.splat(0.0).less(m[K][K]), length);
+    m[K][K] = m[K][K] - image;
+    let inverse = -one / (image * m[K][K]);
+    for j in K + 1..6 {
+        let mut dot = m[K][K] * m[K][j];
+        for i in K + 1..5 {
+            dot = m[i][K].mul_add(m[i][j], dot);
+        }
+        let dot = dot * inverse;
+        for i in K..5 {
+            m[i][j] = dot.neg_mul_add(m[i][K], m[i][j]);
+        }
+    }
+    -inverse * m[K][K]
 }

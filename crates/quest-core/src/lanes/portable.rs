@@ -7,9 +7,9 @@ use super::lane::{Float, Lanes, Mask, WordLanes};
 /// Whether a product and a sum are one instruction of the target; where they are not, `mul_add` is a slow function.
 const FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
-/// `N` lanes in an array.
+/// Arrays of 16 bytes: the registers that nearly every processor has.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Portable<const N: usize>;
+pub(super) struct Portable;
 
 /// `N` numbers.
 #[derive(Clone, Copy, Debug)]
@@ -17,18 +17,18 @@ pub(super) struct Portable<const N: usize>;
 pub(super) struct Array<T, const N: usize>([T; N]);
 
 macro_rules! lanes {
-    ($real:ty) => {
-        impl<const N: usize> Lanes<$real> for Portable<N> {
-            const COUNT: usize = N;
-            type Float = Array<$real, N>;
+    ($real:ty, $count:literal) => {
+        impl Lanes<$real> for Portable {
+            const COUNT: usize = $count;
+            type Float = Array<$real, $count>;
 
             #[inline(always)]
-            fn splat(self, x: $real) -> Array<$real, N> {
-                Array([x; N])
+            fn splat(self, x: $real) -> Array<$real, $count> {
+                Array([x; $count])
             }
 
             #[inline(always)]
-            fn load(self, x: &[$real]) -> Array<$real, N> {
+            fn load(self, x: &[$real]) -> Array<$real, $count> {
                 Array(*x.first_chunk().expect("as many numbers as lanes"))
             }
         }
@@ -100,6 +100,11 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn sum(self) -> $real {
+                self.0.into_iter().sum()
+            }
+
+            #[inline(always)]
             fn store(self, out: &mut [$real]) {
                 out[..N].copy_from_slice(&self.0);
             }
@@ -121,8 +126,8 @@ macro_rules! lanes {
     )*};
 }
 
-lanes!(f32);
-lanes!(f64);
+lanes!(f64, 2);
+lanes!(f32, 4);
 
 impl<const N: usize> Mask for [bool; N] {
     #[inline(always)]
@@ -147,24 +152,24 @@ impl<const N: usize> Mask for [bool; N] {
     }
 }
 
-impl<const N: usize> WordLanes for Portable<N> {
-    type Words = [u64; N];
+impl WordLanes for Portable {
+    type Words = [u64; 2];
 
     #[inline(always)]
-    fn no_bits(self) -> [u64; N] {
-        [0; N]
+    fn no_bits(self) -> [u64; 2] {
+        [0; 2]
     }
 
     #[inline(always)]
-    fn with_bit(self, mut words: [u64; N], mask: [bool; N], bit: u64) -> [u64; N] {
-        for i in 0..N {
+    fn with_bit(self, mut words: [u64; 2], mask: [bool; 2], bit: u64) -> [u64; 2] {
+        for i in 0..2 {
             words[i] |= if mask[i] { bit } else { 0 };
         }
         words
     }
 
     #[inline(always)]
-    fn store_words(self, words: [u64; N], out: &mut [u64]) {
-        out[..N].copy_from_slice(&words);
+    fn store_words(self, words: [u64; 2], out: &mut [u64]) {
+        out[..2].copy_from_slice(&words);
     }
 }

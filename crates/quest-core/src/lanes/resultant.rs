@@ -3,7 +3,7 @@
 use super::elimination::ROWS;
 use super::geometry::{cross, longest};
 use super::lane::{F, Float, Lanes};
-use super::twice::{TwiceLanes, twice};
+use super::twice::{Twice, TwiceLanes, twice};
 
 /// A polynomial of degree ten, coefficients from the constant up.
 pub(super) type Polynomial<L> = [F<L>; 11];
@@ -32,19 +32,6 @@ impl<L: Lanes<f64>> Resultant<L> {
         out
     }
 
-    /// The same equations for twice the lanes.
-    #[inline(always)]
-    pub(super) fn twice(&self) -> Resultant<TwiceLanes<L>> {
-        let mut out =
-            Resultant { x: [twice(&self.x[0]); 3], y: [twice(&self.y[0]); 3], w: [twice(&self.w[0]); 3] };
-        for r in 1..3 {
-            out.x[r] = twice(&self.x[r]);
-            out.y[r] = twice(&self.y[r]);
-            out.w[r] = twice(&self.w[r]);
-        }
-        out
-    }
-
     /// The determinant, whose roots are the values of `z`.
     #[inline(always)]
     pub(super) fn polynomial(&self, lanes: L) -> Polynomial<L> {
@@ -68,28 +55,29 @@ impl<L: Lanes<f64>> Resultant<L> {
         out
     }
 
-    /// `(x, y, z, w)` at a root `z/w`, up to scale: the null vector of the three equations.
+    /// `(x, y, z, w)` at two roots `z/w`, up to scale: the null vectors of the three equations.
     #[inline(always)]
-    pub(super) fn point(&self, z: F<L>, w: F<L>) -> [F<L>; 4] {
+    pub(super) fn points(&self, z: Twice<F<L>>, w: Twice<F<L>>) -> [Twice<F<L>>; 4] {
         let w2 = w * w;
         let powers = [w2 * w2, w2 * w, w2, w];
         let mut m = [[z; 3]; 3];
         for r in 0..3 {
             m[r] = [
-                homogeneous::<L, 4>(&self.x[r], z, [powers[1], powers[2], powers[3]]),
-                homogeneous::<L, 4>(&self.y[r], z, [powers[1], powers[2], powers[3]]),
-                homogeneous5::<L>(&self.w[r], z, powers),
+                homogeneous::<TwiceLanes<L>>(&twice(&self.x[r]), z, [powers[1], powers[2], powers[3]]),
+                homogeneous::<TwiceLanes<L>>(&twice(&self.y[r]), z, [powers[1], powers[2], powers[3]]),
+                homogeneous5::<TwiceLanes<L>>(&twice(&self.w[r]), z, powers),
             ];
         }
-        let null = [cross::<L>(&m[0], &m[1]), cross::<L>(&m[1], &m[2]), cross::<L>(&m[2], &m[0])];
-        let ([x, y, one], _) = longest::<L>(&null);
+        let across = cross::<TwiceLanes<L>>;
+        let ([x, y, one], _) =
+            longest::<TwiceLanes<L>>(&[across(&m[0], &m[1]), across(&m[1], &m[2]), across(&m[2], &m[0])]);
         [x, y, z * one, w * one]
     }
 }
 
 /// `Σ p_k z^k w^(3−k)`, given `w³, w², w`.
 #[inline(always)]
-fn homogeneous<L: Lanes<f64>, const N: usize>(p: &[F<L>; 4], z: F<L>, w: [F<L>; 3]) -> F<L> {
+fn homogeneous<L: Lanes<f64>>(p: &[F<L>; 4], z: F<L>, w: [F<L>; 3]) -> F<L> {
     let value = p[3].mul_add(z, p[2] * w[2]);
     let value = value.mul_add(z, p[1] * w[1]);
     value.mul_add(z, p[0] * w[0])

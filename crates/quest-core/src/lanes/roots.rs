@@ -98,7 +98,8 @@ struct Cell {
 }
 
 impl Cells {
-    fn new() -> Self {
+    /// No cells.
+    pub(super) fn new() -> Self {
         // What is in the slots without a cell must be harmless.
         Self {
             count: [0; MAX_LANES],
@@ -125,7 +126,7 @@ impl Cells {
 }
 
 /// The polynomial at the angles.
-struct Grid {
+pub(super) struct Grid {
     values: [[f64; MAX_LANES]; ANGLES],
     /// The derivatives by `φ`, times a third of the step.
     slopes: [[f64; MAX_LANES]; ANGLES],
@@ -136,8 +137,23 @@ struct Grid {
     negative_before: [u64; MAX_LANES],
 }
 
+impl Grid {
+    /// A grid to be filled.
+    pub(super) fn new() -> Self {
+        let (nothing, none) = ([[0.0; MAX_LANES]; ANGLES], [0; MAX_LANES]);
+        Self {
+            values: nothing,
+            slopes: nothing,
+            negative: none,
+            negative_behind: none,
+            negative_before: none,
+        }
+    }
+}
+
+/// Fills a grid.
 #[inline(always)]
-fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
+fn fill<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>, out: &mut Grid) {
     const HALF: usize = ANGLES / 2;
     let zero = lanes.splat(0.0);
     let (mut c, mut s) = ([zero; 6], [zero; 5]);
@@ -158,14 +174,6 @@ fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
         cs[k] = order * s[k - 1];
         ss[k - 1] = -(order * c[k]);
     }
-    let (nothing, none) = ([[0.0; MAX_LANES]; ANGLES], [0; MAX_LANES]);
-    let mut out = Grid {
-        values: nothing,
-        slopes: nothing,
-        negative: none,
-        negative_behind: none,
-        negative_before: none,
-    };
     let (mut at, mut behind, mut before) = (lanes.no_bits(), lanes.no_bits(), lanes.no_bits());
     for (i, h) in tables.harmonics.iter().enumerate() {
         let h = h.map(|x| lanes.splat(x));
@@ -185,7 +193,6 @@ fn grid<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>) -> Grid {
     lanes.store_words(at, &mut out.negative);
     lanes.store_words(behind, &mut out.negative_behind);
     lanes.store_words(before, &mut out.negative_before);
-    out
 }
 
 /// A sum of five harmonics at `φ, π − φ, π + φ, −φ`, by those of `φ`.
@@ -207,21 +214,23 @@ fn place(cell: usize) -> (usize, usize) {
     (shifted / CHART, shifted % CHART)
 }
 
-/// The cells with a root.
+/// Finds the cells with a root.
 #[inline(always)]
 pub(super) fn isolate<L: WordLanes>(
     lanes: L,
     tables: &Tables,
     p: &Polynomial<L>,
     mirrored: &Polynomial<L>,
-) -> Cells {
-    let grid = grid(lanes, tables, p);
+    grid: &mut Grid,
+    cells: &mut Cells,
+) {
+    fill(lanes, tables, p, grid);
     let mut polynomials = [[[0.0; MAX_LANES]; 11]; 2];
     for k in 0..11 {
         p[k].store(&mut polynomials[0][k]);
         mirrored[k].store(&mut polynomials[1][k]);
     }
-    let mut cells = Cells::new();
+    cells.count = [0; MAX_LANES];
     for lane in 0..L::COUNT {
         let (first, second) = (grid.negative[lane], grid.negative_behind[lane]);
         let (third, last) = (grid.negative_before[lane].rotate_right(1), first.rotate_right(1));
@@ -245,10 +254,9 @@ pub(super) fn isolate<L: WordLanes>(
             let (low, high) = (end(j, tables.edges[k]), end((j + 1) % ANGLES, tables.edges[k + 1]));
             let p = polynomials[chart].map(|coefficient| coefficient[lane]);
             let divided = Divided { p, chart: chart as f64, lane };
-            divided.divide(&low, &high, MAX_DIVISIONS, &mut cells);
+            divided.divide(&low, &high, MAX_DIVISIONS, cells);
         }
     }
-    cells
 }
 
 /// An end of a cell: the polynomial and its derivative there.
@@ -370,8 +378,9 @@ fn with_slope<L: Lanes<f64>>(p: &Polynomial<L>, t: F<L>) -> (F<L>, F<L>) {
     (value, slope)
 }
 
-/// Newton's steps at most.
+/// Newton's steps at most, and the last of them: their convergence is quadratic.
 const MAX_STEPS: usize = 12;
+const SHORT_STEP: f64 = 1e-6;
 
 /// A root for every lane.
 #[derive(Clone, Copy)]
@@ -392,14 +401,13 @@ pub(super) fn refine<L: Lanes<f64>>(
     cells: &Cells,
     slot: usize,
     is_there: M<TwiceLanes<L>>,
-    tolerance: f64,
 ) -> Root<TwiceLanes<L>> {
     let both = |columns: &[[f64; MAX_LANES]; MAX_ROOTS]| {
         Twice(lanes.load(&columns[slot]), lanes.load(&columns[slot + 1]))
     };
     let lanes = TwiceLanes(lanes);
     let (zero, one, half) = (lanes.splat(0.0), lanes.splat(1.0), lanes.splat(0.5));
-    let tolerance = lanes.splat(tolerance);
+    let short = lanes.splat(SHORT_STEP);
     let chart = zero.less(both(&cells.chart));
     let p = in_chart::<TwiceLanes<L>>(&twice(p), &twice(mirrored), chart);
     let (mut low, mut high) = (both(&cells.low), both(&cells.high));
@@ -415,43 +423,66 @@ pub(super) fn refine<L: Lanes<f64>>(
         let inside = low.less(newton).and(newton.less(high));
         let next = newton.select(inside, half * (low + high));
         // A lane that has arrived stays where it is, whatever its neighbours do.
-        let active = tolerance.less(last);
+        let active = short.less(last);
         last = (next - t).abs().select(active, last);
         t = next.select(active, t);
-        if !tolerance.less(last).any() {
+        if !short.less(last).any() {
             break;
         }
     }
-    Root { z: one.select(chart, t), w: (-t).select(chart, one), is_certain: last.less(tolerance + tolerance) }
+    Root { z: one.select(chart, t), w: (-t).select(chart, one), is_certain: last.less(short + short) }
 }
 
 /// The number of real roots by Sturm's theorem: the signs of the leading coefficients of the chain tell how often the sign
 /// changes at −∞ and at +∞.
 #[inline(always)]
 pub(super) fn count<L: Lanes<f64>>(lanes: L, p: &Polynomial<L>) -> F<L> {
-    let (zero, one) = (lanes.splat(0.0), lanes.splat(1.0));
-    let (mut f, mut g) = (*p, [zero; 11]);
+    let (mut g, one) = ([lanes.splat(0.0); 11], lanes.splat(1.0));
     for k in 1..11 {
         g[k - 1] = p[k] * lanes.splat(k as f64 / 10.0);
     }
     // Of degree ten and nine with the same leading coefficient: one change at −∞, none at +∞.
-    let mut count = one;
-    for degree in (2..=10).rev() {
-        let inverse = one / g[degree - 1];
-        let slope = f[degree] * inverse;
-        let offset = slope.neg_mul_add(g[degree - 2], f[degree - 1]) * inverse;
-        let mut rest = [zero; 11];
+    let mut chain = Chain::<L> { lanes, f: *p, g, count: one };
+    chain.step::<10>();
+    chain.step::<9>();
+    chain.step::<8>();
+    chain.step::<7>();
+    chain.step::<6>();
+    chain.step::<5>();
+    chain.step::<4>();
+    chain.step::<3>();
+    chain.step::<2>();
+    chain.count
+}
+
+/// Two neighbours in the chain, and the changes of sign ahead of the second at −∞ less those at +∞.
+struct Chain<L: Lanes<f64>> {
+    lanes: L,
+    f: Polynomial<L>,
+    g: Polynomial<L>,
+    count: F<L>,
+}
+
+impl<L: Lanes<f64>> Chain<L> {
+    /// Moves on by one, to polynomials of degrees `DEGREE − 1` and `DEGREE − 2`.
+    #[inline(always)]
+    fn step<const DEGREE: usize>(&mut self) {
+        let (f, g, one) = (&self.f, &self.g, self.lanes.splat(1.0));
+        let inverse = one / g[DEGREE - 1];
+        let slope = f[DEGREE] * inverse;
+        let offset = slope.neg_mul_add(g[DEGREE - 2], f[DEGREE - 1]) * inverse;
+        let mut rest = [self.lanes.splat(0.0); 11];
         rest[0] = offset.mul_add(g[0], -f[0]);
-        for k in 1..degree - 1 {
+        for k in 1..DEGREE - 1 {
             rest[k] = offset.mul_add(g[k], slope.mul_add(g[k - 1], -f[k]));
         }
-        let leading = rest[degree - 2];
-        count = count + (-one).select((g[degree - 1] * leading).less(zero), one);
+        let leading = rest[DEGREE - 2];
+        let change = (g[DEGREE - 1] * leading).less(self.lanes.splat(0.0));
+        self.count = self.count + (-one).select(change, one);
         let scale = one / leading.abs();
-        for x in &mut rest[..degree - 1] {
+        for x in &mut rest[..DEGREE - 1] {
             *x = *x * scale;
         }
-        (f, g) = (g, rest);
+        (self.f, self.g) = (self.g, rest);
     }
-    count
 }

@@ -87,6 +87,11 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn sum(self) -> $real {
+                cast::<_, [$real; $count]>(self.0).into_iter().sum()
+            }
+
+            #[inline(always)]
             fn store(self, out: &mut [$real]) {
                 out[..$count].copy_from_slice(&cast::<_, [$real; $count]>(self.0));
             }

@@ -47,47 +47,67 @@ fn scalar(five: &[Correspondence]) -> Vec<[f64; 9]> {
     candidates.iter().map(|c| essential(c.pose).as_slice().try_into().unwrap()).collect()
 }
 
-/// How many of the samples are flagged; panics where another one differs from the scalar solver by more than `tolerance`.
-fn compare(
-    instructions: Instructions,
-    matches: &[Correspondence],
-    samples: &[[u32; 5]],
-    tolerance: f64,
-) -> usize {
-    let solver = BatchSolver::with_instructions(Tolerance::Tight, instructions).unwrap();
-    let mut found = Essentials::new();
-    solver.solve(matches, samples, &mut found).unwrap();
-    assert_eq!(found.samples(), samples.len());
-    let mut flagged = 0;
-    for sample in 0..samples.len() {
-        if !found.is_complete(sample) {
-            flagged += 1;
-            continue;
+/// How the lanes and the scalar solver compare on many samples.
+#[derive(Debug, Default)]
+struct Comparison {
+    /// Samples that the lanes leave to the scalar solver.
+    flagged: usize,
+    /// Others where one of the two has a matrix that the other has not.
+    unequal: usize,
+}
+
+impl Comparison {
+    /// Adds samples of five consecutive matches; panics where the same matrix differs by more than `tolerance`.
+    fn add(
+        &mut self,
+        instructions: Instructions,
+        matches: &[Correspondence],
+        samples: &[[u32; 5]],
+        tolerance: f64,
+    ) {
+        /// What is further apart is not the same matrix.
+        const APART: f64 = 1e-3;
+        let solver = BatchSolver::with_instructions(Tolerance::Tight, instructions).unwrap();
+        let mut found = Essentials::new();
+        solver.solve(matches, samples, &mut found).unwrap();
+        assert_eq!(found.samples(), samples.len());
+        for sample in 0..samples.len() {
+            if !found.is_complete(sample) {
+                self.flagged += 1;
+                continue;
+            }
+            let expected = scalar(&matches[5 * sample..5 * sample + 5]);
+            let error = hausdorff(&found.matrices()[found.of(sample)], &expected);
+            self.unequal += usize::from(error > APART);
+            assert!(error < tolerance || error > APART, "{instructions:?}, scene {sample}: {error:e}");
         }
-        let expected = scalar(&matches[5 * sample..5 * sample + 5]);
-        let error = hausdorff(&found.matrices()[found.of(sample)], &expected);
-        assert!(error < tolerance, "{instructions:?}, scene {sample}: {error:e}");
     }
-    flagged
 }
 
 #[test]
 fn lanes_are_the_scalar_solver() {
     let (matches, samples) = samples((0..1000).map(|index| scene(5, 0.75, index)));
     for instructions in available() {
-        assert!(compare(instructions, &matches, &samples, 1e-9) < 20);
+        let mut found = Comparison::default();
+        found.add(instructions, &matches, &samples, 1e-9);
+        assert!(found.flagged < 10 && found.unequal == 0, "{instructions:?} {found:?}");
     }
 }
 
+/// Of nearly coincident solutions rounding decides which are real, and either of the two may lose a pair.
 #[test]
-#[ignore = "a minute: 100,000 scenes"]
+#[ignore = "ten seconds: 100,000 scenes"]
 fn lanes_are_the_scalar_solver_a_hundred_thousand_times() {
+    let mut found = Instructions::ALL.map(|_| Comparison::default());
     for batch in 0..100 {
         let (matches, samples) = samples((0..1000).map(|index| scene(5, 0.75, 1000 * batch + index)));
-        for instructions in available() {
-            compare(instructions, &matches, &samples, 1e-9);
+        for (instructions, found) in Instructions::ALL.into_iter().zip(&mut found) {
+            if instructions.is_available() {
+                found.add(instructions, &matches, &samples, 1e-9);
+            }
         }
     }
+    assert!(found.iter().all(|found| found.flagged < 500 && found.unequal < 10), "{found:?}");
 }
 
 #[test]
@@ -98,7 +118,9 @@ fn little_parallax_is_no_difficulty() {
         let scenes = (0..300).map(|index| Scene::generate(&options, 607, index).unwrap());
         let (matches, samples) = samples(scenes);
         for instructions in available() {
-            assert!(compare(instructions, &matches, &samples, tolerance) < 10);
+            let mut found = Comparison::default();
+            found.add(instructions, &matches, &samples, tolerance);
+            assert!(found.flagged < 10 && found.unequal < 3, "{instructions:?} {parallax} {found:?}");
         }
     }
 }

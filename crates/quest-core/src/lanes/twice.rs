@@ -97,6 +97,11 @@ impl<V: Float<f64>> Float<f64> for Twice<V> {
     }
 
     #[inline(always)]
+    fn sum(self) -> f64 {
+        self.0.sum() + self.1.sum()
+    }
+
+    #[inline(always)]
     fn store(self, out: &mut [f64]) {
         // As many as the other half of `out` begins behind.
         let (first, second) = out.split_at_mut(out.len() / 2);

@@ -13,7 +13,7 @@ pub(super) struct Vector<S>(pub(super) S);
 macro_rules! lanes {
     ($real:ty, $Float:ident, $Mask:ident, $floats:ident, $masks:ident, $lanes:ident: [
         $splat:ident $add:ident $sub:ident $mul:ident $div:ident $neg:ident $mul_add:ident $neg_mul_add:ident $sqrt:ident
-        $abs:ident $less:ident $select:ident $and:ident $or:ident $first:ident $view:ident $view_mut:ident
+        $abs:ident $less:ident $select:ident $and:ident $or:ident $sum:ident $first:ident $view:ident $view_mut:ident
     ]) => {
         /// A register, with the proof that it exists.
         #[derive(Clone, Copy, Debug)]
@@ -83,6 +83,11 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn sum(self) -> $real {
+                self.1.$sum(self.0)
+            }
+
+            #[inline(always)]
             fn store(self, out: &mut [$real]) {
                 S::$view_mut(out).0[0] = self.0;
             }
@@ -119,12 +124,12 @@ macro_rules! lanes {
 
 lanes!(f64, Double, DoubleMask, f64s, m64s, F64_LANES: [
     splat_f64s add_f64s sub_f64s mul_f64s div_f64s neg_f64s mul_add_e_f64s negate_mul_add_e_f64s sqrt_f64s
-    abs_f64s less_than_f64s select_f64s and_m64s or_m64s first_true_m64s as_simd_f64s as_mut_simd_f64s
+    abs_f64s less_than_f64s select_f64s and_m64s or_m64s reduce_sum_f64s first_true_m64s as_simd_f64s as_mut_simd_f64s
 ]);
 
 lanes!(f32, Single, SingleMask, f32s, m32s, F32_LANES: [
     splat_f32s add_f32s sub_f32s mul_f32s div_f32s neg_f32s mul_add_e_f32s negate_mul_add_e_f32s sqrt_f32s
-    abs_f32s less_than_f32s select_f32s and_m32s or_m32s first_true_m32s as_simd_f32s as_mut_simd_f32s
+    abs_f32s less_than_f32s select_f32s and_m32s or_m32s reduce_sum_f32s first_true_m32s as_simd_f32s as_mut_simd_f32s
 ]);
 
 impl<S: Simd> WordLanes for Vector<S> {

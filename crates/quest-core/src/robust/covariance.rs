@@ -1,22 +1,29 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
-//! It is `1.10 σ² H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factor the price of the last
-//! refinement's loss. False matches among the inliers are not accounted for.
+//! It is `1.02 σ² H⁻¹ + 1.40 H⁻¹ S H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factors those
+//! of the last refinement's loss. `S` is what false matches that happen to agree with the pose pull at it: as many as there are
+//! outliers are expected to have `S = Σ ψ² J Jᵀ`, which is measured on false matches (see
+//! [`significance`](super::significance)).
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
-use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, SVector, UnitQuaternion, Vector5};
+use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
 
 use super::length::{Length, length};
-use super::loss::Truncated;
+use super::loss::{Biweight, SquaredInfluence, Truncated};
 use super::observations::Observations;
+use super::polish::WIDTH;
+use super::pose_score::PoseScorer;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::Motion;
 
-/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with the loss of Geman and
-/// `McClure` at three standard deviations.
-const EFFICIENCY: f64 = 1.10;
+/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with a biweight of six standard
+/// deviations.
+const EFFICIENCY: f64 = 1.02;
+
+/// `1 / E[ψ']²` of the same.
+const PULL: f64 = 1.40;
 
 /// Steps of the numerical derivatives of the length, in radians.
 const STEP: f64 = 1e-5;
@@ -30,11 +37,28 @@ fn of_motion(
     motion: &Motion,
     inliers: &[u32],
     sigma: f64,
+    false_matches: &[Observations],
 ) -> Option<Matrix5<f64>> {
     let subset = Subset::new(observations, inliers);
     let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));
     let inverse = equations.hessian.cholesky()?.inverse();
-    Some(inverse * (EFFICIENCY * sigma * sigma))
+    let outliers = (observations.len() - inliers.len()) as f64;
+    let pull = pull_of_a_match(false_matches, motion, WIDTH * sigma) * outliers;
+    Some(inverse * (EFFICIENCY * sigma * sigma) + inverse * pull * inverse * PULL)
+}
+
+/// The mean of `ψ² J Jᵀ` over false matches, most of which are too far off to count.
+fn pull_of_a_match(false_matches: &[Observations], motion: &Motion, limit: f64) -> Matrix5<f64> {
+    let mut pull = Matrix5::zeros();
+    let mut all = 0_usize;
+    for some in false_matches {
+        let mut poses = PoseScorer::new(some, limit);
+        poses.score(*motion, limit);
+        let subset = Subset::new(some, &poses.inliers);
+        pull += subset.equations(some, motion, &SquaredInfluence(Biweight::new(limit))).hessian;
+        all += some.len();
+    }
+    pull / all.max(1) as f64
 }
 
 /// The covariance of `(ω, t_21)` of a motion whose translation has this length.
@@ -44,8 +68,9 @@ pub(super) fn of_pose(
     inliers: &[u32],
     sigma: f64,
     size: Length,
+    false_matches: &[Observations],
 ) -> Option<Matrix6<f64>> {
-    let five = of_motion(observations, motion, inliers, sigma)?;
+    let five = of_motion(observations, motion, inliers, sigma, false_matches)?;
     let tangent = tangent_basis(&motion.direction);
     // The derivatives of the length hardly need all of the matches.
     let some = &inliers[..inliers.len().min(ENOUGH)];
@@ -90,9 +115,4 @@ pub(super) fn of_rotation(
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
     Some(covariance)
-}
-
-/// What stands where the matches leave some direction open: so large that nothing is excluded.
-pub(super) fn unknown() -> Matrix6<f64> {
-    Matrix6::from_diagonal(&SVector::from([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]))
 }

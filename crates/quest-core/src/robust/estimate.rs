@@ -15,8 +15,6 @@ pub enum Model {
     /// No translation that stands clear of the noise. The rotation is right; the translation is the small vector that is left,
     /// of no meaning where it is within its covariance.
     PureRotation,
-    /// The matches leave a whole family of poses; the one given is a member of it.
-    Degenerate,
 }
 
 impl Model {
@@ -27,7 +25,6 @@ impl Model {
             Self::General => "general",
             Self::Planar => "planar",
             Self::PureRotation => "pure_rotation",
-            Self::Degenerate => "degenerate",
         }
     }
 }

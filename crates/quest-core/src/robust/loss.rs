@@ -19,6 +19,10 @@ pub(super) struct Biweight {
     pub(super) inverse_square: f64,
 }
 
+/// For sums over matches of `ψ² J Jᵀ` in place of a loss: `ψ = r (1 − r²/c²)²` is the influence of a residual under [`Biweight`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SquaredInfluence(pub(super) Biweight);
+
 /// `r² / (1 + r²/c²)`: the loss of Geman and `McClure`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GemanMcClure {
@@ -58,6 +62,15 @@ impl Loss for Biweight {
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let rest = (1.0 - square * self.inverse_square).max(0.0);
         (1.0 - rest * rest * rest, 3.0 * self.inverse_square * rest * rest)
+    }
+}
+
+impl Loss for SquaredInfluence {
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
+    fn cost_and_weight(&self, square: f64) -> (f64, f64) {
+        let rest = (1.0 - square * self.0.inverse_square).max(0.0);
+        (0.0, square * (rest * rest) * (rest * rest))
     }
 }
 

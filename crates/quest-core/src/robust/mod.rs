@@ -47,6 +47,7 @@ mod significance;
 mod stopping;
 #[cfg(test)]
 mod tests;
+mod third_view;
 mod transfer;
 mod verdict;
 
@@ -56,13 +57,15 @@ use rand_chacha::ChaCha8Rng;
 pub use batch::{Problem, estimate_batch};
 pub use estimate::{Estimate, Evidence, Model, RunnerUp};
 pub use options::{EstimateError, KnownDirection, Options, Priors};
+pub use third_view::{ThirdView, estimate_with_third_view};
 
 use crate::degeneracy::diagnose;
 use crate::solver::motion::Motion;
-use crate::{Correspondence, InputError};
+use crate::{Correspondence, Degeneracy, InputError};
 use observations::Observations;
 use sampling::Sampler;
 use search::{Limits, Search};
+use verdict::Answer;
 
 /// Fewer matches than this have no pose.
 pub const MIN_MATCHES: usize = 5;
@@ -75,7 +78,8 @@ const DIAGNOSED: usize = 300;
 /// # Errors
 /// [`EstimateError::Option`] for an impossible option, [`EstimateError::Input`] for fewer than [`MIN_MATCHES`] matches (or
 /// than the solver takes) and for matches that determine no pose, [`EstimateError::NoPose`] where the best pose
-/// agrees with no more matches than chance explains. With fewer than ten matches the best pose is always returned.
+/// agrees with no more matches than chance explains. With fewer than ten matches, of which that cannot be said, the best pose is
+/// returned where five of them agree with it.
 pub fn estimate(matches: &[Correspondence], options: &Options) -> Result<Estimate, EstimateError> {
     estimate_with(matches, options, &Priors::default())
 }
@@ -89,22 +93,49 @@ pub fn estimate_with(
     options: &Options,
     priors: &Priors,
 ) -> Result<Estimate, EstimateError> {
+    answer(matches, options, priors, Answer::Best)
+}
+
+fn answer(
+    matches: &[Correspondence],
+    options: &Options,
+    priors: &Priors,
+    answer: Answer,
+) -> Result<Estimate, EstimateError> {
     options.check()?;
     priors.check(matches.len())?;
     let needed = options.solver.info().min_matches.max(MIN_MATCHES);
     if matches.len() < needed {
         return Err(InputError::TooFewMatches { found: matches.len(), needed }.into());
     }
-    let mut rng = sampling::generator(options.seed);
+    let mut rng = sampling::generator(options.seed, options.index);
     let mut order: Vec<usize> = (0..matches.len()).collect();
     order.shuffle(&mut rng);
     let observations = Observations::new(matches, order, options.focal_lengths);
     let mut search = search(&observations, options, priors, rng.clone());
     let Some(best) = search.best else {
-        let reason = diagnose(&observations.matches[..matches.len().min(DIAGNOSED)]);
-        return Err(InputError::Degenerate(reason).into());
+        return Err(no_pose(&observations, options.threshold, 0));
     };
-    verdict::conclude(&mut search, best, &mut rng)
+    verdict::conclude(&mut search, best, answer, &mut rng)
+}
+
+/// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.
+fn no_pose(observations: &Observations, threshold: f64, inliers: usize) -> EstimateError {
+    let some = &observations.matches[..observations.len().min(DIAGNOSED)];
+    let otherwise = if observations.is_line(some, threshold) {
+        InputError::Degenerate(Degeneracy::Collinear).into()
+    } else {
+        EstimateError::NoPose { inliers, matches: observations.len() }
+    };
+    degenerate(observations, otherwise)
+}
+
+/// What is exactly wrong with the matches, or something else.
+fn degenerate(observations: &Observations, otherwise: EstimateError) -> EstimateError {
+    match diagnose(&observations.matches[..observations.len().min(DIAGNOSED)]) {
+        Degeneracy::RankDeficient => otherwise,
+        reason => InputError::Degenerate(reason).into(),
+    }
 }
 
 /// Steps 1 and 2: the best pose that samples lead to.

@@ -29,7 +29,7 @@ const ROTATION: f64 = 3.0;
 const PLANE: f64 = 1.7;
 const PLANE_OF_FEW: f64 = 20.0;
 
-/// A plane is exact below this: one, and its scatter for a hundred matches.
+/// A plane is exact below this, at the noise that the matches show: one, and its scatter for a hundred matches.
 const EXACT_PLANE: f64 = 1.3;
 
 /// The noise that models are compared at is not taken to be below this share of the threshold: of noise so small
@@ -65,22 +65,24 @@ pub(super) fn choose(
 ) -> Verdict {
     let observations = poses.observations;
     let inliers = &poses.inliers[..poses.inliers.len().min(ENOUGH)];
-    let sigma = sigma.max(LEAST_NOISE * poses.threshold);
+    let noise = sigma;
+    let sigma = noise.max(LEAST_NOISE * poses.threshold);
     let framed = observations.framed(inliers);
     let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();
     let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals[i as usize].powi(2)).collect();
     let transfer = |h: &Matrix3<f64>| -> Vec<f64> { framed.iter().map(|m| square_error(h, m)).collect() };
     let (rotation, planar) = (transfer(&r_21), plane.map(|plane| transfer(&plane.homography)));
-    let excess = |model: &[f64]| {
+    let excess = |model: &[f64], sigma: f64| {
         let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
         (capped(model) - capped(&general)) / inliers.len().max(1) as f64
     };
     let few = (PLANE_OF_FEW / inliers.len().max(1) as f64).min(1.0);
-    let of_plane = planar.as_ref().map_or(CAP, |planar| excess(planar));
-    let model = if excess(&rotation) < ROTATION {
+    let of_plane = |sigma| planar.as_ref().map_or(CAP, |planar| excess(planar, sigma));
+    let is_exact_plane = of_plane(noise) < EXACT_PLANE;
+    let model = if excess(&rotation, sigma) < ROTATION {
         Model::PureRotation
-    } else if of_plane < PLANE + few {
+    } else if of_plane(sigma) < PLANE + few {
         Model::Planar
     } else {
         Model::General
@@ -90,7 +92,7 @@ pub(super) fn choose(
         planar_px: planar.map_or(f64::INFINITY, median_root),
         general_px: median_root(general),
     };
-    Verdict { model, evidence, q_21, is_exact_plane: of_plane < EXACT_PLANE }
+    Verdict { model, evidence, q_21, is_exact_plane }
 }
 
 /// The rotation that best takes the points to their matches, from two starts: that of the pose and that which aligns the

@@ -13,6 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Correspondence;
+use crate::degeneracy::nearly_on_a_line;
 use crate::epipolar_frame::tangent_basis;
 
 /// How a match as it was given lies on the plane `z = 1`: rounding.
@@ -118,6 +119,11 @@ impl Observations {
             Image::Plane(_) => 0.0,
             Image::Sphere(f) => 1.0 / (f * f),
         })
+    }
+
+    /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
+    pub(super) fn is_line(&self, some: &[Correspondence], threshold: f64) -> bool {
+        nearly_on_a_line(some, self.images.map(|image| threshold / image.square_focal_length().sqrt()))
     }
 
     /// The squared angle, in radians, that a pixel in both views stands for.

@@ -22,6 +22,8 @@ pub struct Options {
     pub max_iterations: usize,
     /// The same seed gives the same answer, bit for bit.
     pub seed: u64,
+    /// Which of the pairs that share a seed this is: each has random numbers of its own.
+    pub index: u64,
     /// The solver of the samples; it decides how many matches a sample has.
     pub solver: SolverName,
 }
@@ -36,6 +38,7 @@ impl Default for Options {
             min_iterations: 300,
             max_iterations: 100_000,
             seed: 0,
+            index: 0,
             solver: SolverName::default(),
         }
     }

@@ -1,6 +1,6 @@
 //! The last refinement of a pose: over all of its inliers, with the noise that they show.
 
-use super::loss::{GemanMcClure, Truncated};
+use super::loss::{Biweight, Truncated};
 use super::noise;
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
@@ -9,11 +9,18 @@ use crate::solver::motion::Motion;
 /// Steps of each refinement.
 const STEPS: usize = 15;
 
-/// The scale of the last loss, in standard deviations of the noise.
-pub(super) const SCALE: f64 = 3.0;
+/// Inliers, at most, that the first of them looks at: it is where the second begins.
+const ENOUGH: usize = 5_000;
 
-/// How far it looks, in standard deviations.
+/// Where the last loss levels off, in standard deviations of the noise: far enough out that normal noise loses 2 % of its
+/// worth, and a false match beyond has no say.
+pub(super) const WIDTH: f64 = 6.0;
+
+/// The inliers that it is fitted over, in standard deviations.
 const WIDE: f64 = 9.0;
+
+/// The scale of the losses of rotations, planes and alternatives, in standard deviations.
+pub(super) const SCALE: f64 = 3.0;
 
 /// Fewer inliers than this do not determine a motion and its noise.
 pub(super) const FEWEST: usize = 6;
@@ -33,7 +40,8 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     let mut best = poses.score(start, threshold);
     let mut motion = start;
     if poses.inliers.len() >= FEWEST {
-        let subset = Subset::new(poses.observations, &poses.inliers);
+        let some = poses.inliers.len().min(ENOUGH);
+        let subset = Subset::new(poses.observations, &poses.inliers[..some]);
         refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
         take_better(poses, &mut best, motion);
     }
@@ -42,7 +50,7 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     if poses.inliers.len() >= FEWEST {
         let mut motion = best.motion;
         let subset = Subset::new(poses.observations, &poses.inliers);
-        refine(poses.observations, &subset, &mut motion, &GemanMcClure::new(SCALE * sigma), STEPS);
+        refine(poses.observations, &subset, &mut motion, &Biweight::new(WIDTH * sigma), STEPS);
         let scored = poses.best_pose(&motion.essential(), threshold);
         best = scored.unwrap_or(best);
     }

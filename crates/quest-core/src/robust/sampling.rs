@@ -44,9 +44,11 @@ struct Prosac {
     iteration: f64,
 }
 
-/// The generator of an estimate.
-pub(super) fn generator(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
+/// The generator of the estimate of the pair with this index among those that share a seed.
+pub(super) fn generator(seed: u64, index: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(index);
+    rng
 }
 
 impl Sampler {
@@ -60,6 +62,11 @@ impl Sampler {
             Some(ranked) => Kind::Prosac(Prosac::new(ranked, size)),
         };
         Self { rng, matches, size, kind }
+    }
+
+    /// Whether every sample is drawn once, in which case none is left out.
+    pub(super) fn is_exhaustive(&self) -> bool {
+        matches!(self.kind, Kind::Exhaustive(_))
     }
 
     /// The next sample, `None` when every one has been drawn.
@@ -158,7 +165,7 @@ mod tests {
     #[test]
     fn samples_are_distinct_and_cover_all() {
         for size in [4, 5, 8] {
-            let mut sampler = Sampler::new(generator(SEED), 20, size, None);
+            let mut sampler = Sampler::new(generator(SEED, 0), 20, size, None);
             let mut seen = HashSet::new();
             for sample in drawn(&mut sampler, 500) {
                 let distinct: HashSet<_> = sample.iter().copied().collect();
@@ -173,7 +180,7 @@ mod tests {
     #[test]
     fn few_matches_are_tried_in_every_combination_once() {
         for (count, size, expected) in [(5, 5, 1), (7, 5, 21), (10, 5, 252), (9, 8, 9), (6, 4, 15)] {
-            let mut sampler = Sampler::new(generator(SEED), count, size, None);
+            let mut sampler = Sampler::new(generator(SEED, 0), count, size, None);
             let all: HashSet<_> = drawn(&mut sampler, 10_000).into_iter().collect();
             assert_eq!(all.len(), expected);
         }
@@ -182,7 +189,7 @@ mod tests {
     #[test]
     fn prosac_begins_with_the_best_and_ends_with_all() {
         let ranked: Vec<_> = (0..100).rev().collect();
-        let mut sampler = Sampler::new(generator(SEED), 100, 5, Some(ranked));
+        let mut sampler = Sampler::new(generator(SEED, 0), 100, 5, Some(ranked));
         let mut first = drawn(&mut sampler, 1).remove(0);
         first.sort_unstable();
         assert_eq!(first, [95, 96, 97, 98, 99]);
@@ -194,7 +201,7 @@ mod tests {
 
     #[test]
     fn the_seed_decides() {
-        let all = |seed| drawn(&mut Sampler::new(generator(seed), 50, 5, None), 20);
+        let all = |seed| drawn(&mut Sampler::new(generator(seed, 0), 50, 5, None), 20);
         assert_eq!(all(1), all(1));
         assert_ne!(all(1), all(2));
     }

@@ -98,6 +98,9 @@ impl<'a> Search<'a> {
 
     /// Draws samples until the limits say that it is enough.
     pub(super) fn run(&mut self, sampler: &mut Sampler, limits: &Limits) {
+        // Where there are few samples it costs little to see them all.
+        let min_iterations = if sampler.is_exhaustive() { usize::MAX } else { limits.min_iterations };
+        let limits = &Limits { min_iterations, ..*limits };
         let mut enough = self.enough(limits);
         let mut block = FIRST_BLOCK;
         while self.iterations < enough {

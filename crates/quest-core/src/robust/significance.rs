@@ -30,9 +30,14 @@ const SOLUTIONS: f64 = 4.0;
 const ACCEPTED: f64 = -1.0;
 
 /// Whether chance does not explain the inliers that `poses` holds, those of `motion`, found among so many samples.
-pub(super) fn is_significant(poses: &PoseScorer, motion: &Motion, iterations: usize) -> bool {
+pub(super) fn is_significant(
+    poses: &PoseScorer,
+    motion: &Motion,
+    iterations: usize,
+    false_matches: &[Observations],
+) -> bool {
     let observations = poses.observations;
-    let chance = chance_of_a_pixel(observations, motion, poses.threshold);
+    let chance = chance_of_a_pixel(false_matches, motion, poses.threshold);
     let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals[i as usize].abs()).collect();
     errors.sort_unstable_by(f64::total_cmp);
     log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64) < ACCEPTED
@@ -52,21 +57,28 @@ fn log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, trie
     least
 }
 
-/// The share of false matches that agree with a motion to one pixel.
-fn chance_of_a_pixel(observations: &Observations, motion: &Motion, threshold: f64) -> f64 {
+/// Sets of matches that are false: the points of view 1 with those of view 2 shifted against them.
+pub(super) fn false_matches(observations: &Observations) -> Vec<Observations> {
     let n = observations.len();
     let shifts = FALSE_MATCHES.div_ceil(n).min(n - 1);
-    let (mut agreeing, mut all) = (1.0, 1.0);
-    for k in 1..=shifts {
+    let shifted = |k| {
         let shift = k * (n - 1) / shifts;
-        let shifted: Vec<Correspondence> = (0..n.min(FALSE_MATCHES))
+        let matches: Vec<Correspondence> = (0..n.min(FALSE_MATCHES))
             .map(|i| observations.matches[i].with_view2_of(&observations.matches[(i + shift) % n]))
             .collect();
-        let false_matches = observations.with_matches(shifted);
-        let mut poses = PoseScorer::new(&false_matches, WIDE * threshold);
+        observations.with_matches(matches)
+    };
+    (1..=shifts).map(shifted).collect()
+}
+
+/// The share of false matches that agree with a motion to one pixel.
+fn chance_of_a_pixel(false_matches: &[Observations], motion: &Motion, threshold: f64) -> f64 {
+    let (mut agreeing, mut all) = (1.0, 1.0);
+    for some in false_matches {
+        let mut poses = PoseScorer::new(some, WIDE * threshold);
         poses.score(*motion, WIDE * threshold);
         agreeing += poses.inliers.len() as f64;
-        all += false_matches.len() as f64;
+        all += some.len() as f64;
     }
     agreeing / all / (WIDE * threshold)
 }

@@ -1,21 +1,17 @@
 //! When enough samples have been drawn.
 
-/// How often a sample without outliers has to come up before one is trusted to have been good enough: noise makes
-/// many of them useless.
-const REPEATS: f64 = 3.0;
+/// The share of the samples without outliers that lead to the pose: noise makes the others useless.
+const USEFUL: f64 = 1.0 / 3.0;
 
-/// How many samples of `size` matches it takes until, with probability `confidence`, enough of them hold
-/// inliers alone.
+/// How many samples of `size` matches it takes until, with probability `confidence`, one of them holds inliers alone and
+/// is useful.
 ///
 /// Samples are drawn without replacement, which matters where there are few matches.
 pub(super) fn iterations(inliers: usize, matches: usize, size: usize, confidence: f64) -> f64 {
     let all_inliers: f64 =
         (0..size).map(|k| inliers.saturating_sub(k) as f64 / (matches - k) as f64).product();
-    if all_inliers >= 1.0 {
-        return 1.0;
-    }
     // ln_1p keeps what a small probability has.
-    (REPEATS * (1.0 - confidence).ln() / (-all_inliers).ln_1p()).max(1.0)
+    ((1.0 - confidence).ln() / (-USEFUL * all_inliers).ln_1p()).max(1.0)
 }
 
 #[cfg(test)]
@@ -24,13 +20,14 @@ mod tests {
 
     #[test]
     fn numbers_are_those_of_the_formula() {
-        // 0.5^5 = 1/32 for many matches: ln(0.001) / ln(31/32) = 217.6.
-        let many = iterations(500_000, 1_000_000, 5, 0.999) / REPEATS;
-        assert!((many - 217.6).abs() < 0.1, "{many}");
+        // 0.5^5 / 3 = 1/96 for many matches: ln(0.001) / ln(95/96) = 659.7.
+        let many = iterations(500_000, 1_000_000, 5, 0.999);
+        assert!((many - 659.7).abs() < 0.1, "{many}");
         // 252 of 15504 samples of 5 out of 20 come from 10 inliers.
-        let few = iterations(10, 20, 5, 0.9) / REPEATS;
-        assert!((few - 0.1_f64.ln() / (1.0 - 252.0 / 15504.0_f64).ln()).abs() < 1e-9);
-        assert!(iterations(20, 20, 5, 0.999) <= 1.0);
+        let few = iterations(10, 20, 5, 0.9);
+        assert!((few - 0.1_f64.ln() / (1.0 - 84.0 / 15504.0_f64).ln()).abs() < 1e-9);
+        // Inliers alone: 0.001 = (2/3)^17.04.
+        assert!((iterations(20, 20, 5, 0.999) - 17.04).abs() < 0.01);
         assert!(iterations(4, 20, 5, 0.999).is_infinite());
     }
 

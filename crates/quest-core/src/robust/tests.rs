@@ -1,6 +1,7 @@
 //! Planted poses among outliers.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::simulate::{FOCAL_LENGTH, Layout, Motion as SceneMotion, Scene, SceneOptions};
@@ -104,15 +105,78 @@ fn an_exact_rotation_needs_no_translation() {
 }
 
 #[test]
-fn the_seed_decides_and_nothing_else() {
+fn the_seed_and_the_index_decide_and_nothing_else() {
     let (scene, _) = scene(&noisy(100), 0.5, 60);
-    let with = |seed| estimate(&scene.matches, &Options { seed, ..options() }).unwrap();
-    assert_eq!(with(1), with(1));
-    assert_ne!(with(1).iterations + with(2).iterations, 0);
+    let with = |seed, index| estimate(&scene.matches, &Options { seed, index, ..options() }).unwrap();
+    assert_eq!(with(1, 2), with(1, 2));
+    assert!(with(1, 0) != with(1, 1) && with(1, 0) != with(2, 0));
     let problem = Problem { matches: &scene.matches, focal_lengths: [[FOCAL_LENGTH; 2]; 2] };
+    let one_by_one: Vec<_> = (0..5).map(|index| Ok(with(1, index))).collect();
+    let batch = |range: std::ops::Range<usize>, threads| {
+        let options = Options { seed: 1, index: range.start as u64, ..options() };
+        estimate_batch(&vec![problem; range.len()], &options, threads)
+    };
     for threads in [0, 1, 2, 3] {
-        let all = estimate_batch(&[problem; 5], &Options { seed: 1, ..options() }, threads);
-        assert!(all.iter().all(|e| e.as_ref().unwrap() == &with(1)));
+        assert_eq!(batch(0..5, threads), one_by_one);
+        assert_eq!([batch(0..2, threads), batch(2..5, threads)].concat(), one_by_one);
+    }
+}
+
+#[test]
+fn degenerate_matches_have_no_pose() {
+    let pixel = |u: f64, v: f64| [(u - 512.0) / FOCAL_LENGTH, (v - 384.0) / FOCAL_LENGTH];
+    let refused = |count: u32, noise: f64, view2: &dyn Fn(f64) -> [f64; 2]| {
+        let mut rng = sampling::generator(SEED, u64::from(count));
+        let mut normal = || noise * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+        let matches: Vec<_> = (0..count)
+            .map(|i| {
+                let s = 600.0 * f64::from(i * i + i) / f64::from(count * count);
+                let [u, v] = view2(s);
+                let x1 = pixel(200.0 + s + normal(), 150.0 + 0.7 * s + normal());
+                Correspondence::from_image_points(x1, pixel(u + normal(), v + normal())).unwrap()
+            })
+            .collect();
+        estimate(&matches, &options()).unwrap_err()
+    };
+    let line = |s: f64| [250.0 + 0.8 * s + 2e-4 * s * s, 500.0 - 0.3 * (0.8 * s + 2e-4 * s * s)];
+    for (count, noise) in [(5, 0.0), (8, 0.0), (50, 0.0), (20, 0.5), (200, 0.5)] {
+        let found = refused(count, noise, &line);
+        assert_eq!(found, InputError::Degenerate(Degeneracy::Collinear).into(), "{count}, {noise} px");
+    }
+    // On a line in view 1 alone, and in view 2 anywhere: false matches.
+    for count in [20, 100] {
+        let found = refused(count, 0.0, &|s| [(37.0 * s) % 1000.0, (53.0 * s) % 700.0]);
+        assert!(matches!(found, EstimateError::NoPose { .. }), "{count}: {found}");
+    }
+    for noise in [0.0, 0.5] {
+        let one = Correspondence::from_image_points([0.1, 0.2], [0.15, 0.2]).unwrap();
+        assert_eq!(
+            estimate(&[one; 30], &options()).unwrap_err(),
+            InputError::Degenerate(Degeneracy::Coincident).into(),
+            "{noise}"
+        );
+    }
+}
+
+#[test]
+fn five_points_on_a_line_of_one_view_have_a_pose_that_fits_them_or_none() {
+    let mut rng = sampling::generator(SEED, 140);
+    for _ in 0..50 {
+        use rand::RngExt;
+        let mut number = || rng.random_range(-0.4..0.4);
+        let matches: Vec<_> = (0..5)
+            .map(|_| {
+                let s = number();
+                Correspondence::from_image_points([s, 0.3 * s + 0.1], [number(), number()]).unwrap()
+            })
+            .collect();
+        match estimate(&matches, &options()) {
+            Ok(found) => {
+                assert_eq!(found.inlier_count, 5);
+                assert!(matches.iter().all(|m| found.pose.sampson_error(m) < 1e-3), "{found:?}");
+            }
+            Err(refused) => assert!(matches!(refused, EstimateError::NoPose { .. }), "{refused}"),
+        }
     }
 }
 
@@ -232,7 +296,7 @@ fn a_fisheye_camera_sees_behind_itself() {
         Camera::new(CameraModel::OpenCvFisheye, &[300.0, 300.0, 480.0, 480.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
     let truth =
         RelativePose::new(UnitQuaternion::new(Vector3::new(0.1, -0.2, 0.15)), Vector3::new(0.3, 0.1, -0.2));
-    let mut rng = sampling::generator(SEED);
+    let mut rng = sampling::generator(SEED, 0);
     let mut matches = Vec::new();
     while matches.len() < 80 {
         use rand::RngExt;

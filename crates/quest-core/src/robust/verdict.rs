@@ -4,7 +4,6 @@
 use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
-use super::DIAGNOSED;
 use super::covariance;
 use super::estimate::{Estimate, Model, RunnerUp};
 use super::length::{Length, length};
@@ -18,9 +17,9 @@ use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
 use super::score::MANY;
 use super::search::Search;
-use super::significance::is_significant;
+use super::significance::{self, is_significant};
 use super::transfer::square_error;
-use crate::degeneracy::diagnose;
+use super::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
 use crate::{Degeneracy, InputError, RelativePose};
@@ -43,10 +42,20 @@ const WIDE: f64 = 2.0;
 /// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
 const NEAR_POINT: f64 = 3.0;
 
+/// Which of two poses that explain the matches is given as the answer, the other being the runner-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// The one that explains them better.
+    Best,
+    /// The other, because something else is known.
+    Other,
+}
+
 /// Steps 3 to 6.
 pub(super) fn conclude(
     search: &mut Search,
     best: Scored,
+    answer: Answer,
     rng: &mut ChaCha8Rng,
 ) -> Result<Estimate, EstimateError> {
     let iterations = search.iterations;
@@ -58,21 +67,46 @@ pub(super) fn conclude(
     replace(poses, &mut polished, &mut others);
     poses.score(polished.scored.motion, poses.threshold);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
-    // Of fewer matches chance cannot be told from truth, and the best pose is returned as it is.
-    if observations.len() >= MANY && !is_significant(poses, &polished.scored.motion, iterations) {
-        return Err(EstimateError::NoPose { inliers, matches: observations.len() });
+    // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
+    let false_matches =
+        if observations.len() < MANY { Vec::new() } else { significance::false_matches(observations) };
+    let agrees = match observations.len() {
+        ..MANY => inliers >= MIN_MATCHES,
+        _ => is_significant(poses, &polished.scored.motion, iterations, &false_matches),
+    };
+    if !agrees {
+        return Err(no_pose(observations, poses.threshold, inliers));
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
-    let estimate = assemble(poses, &polished, &others, &of_few, &verdict, iterations);
-    // Points on a line, or repeated ones, have no pose; other families of poses have a member that may be of use.
-    if estimate.model == Model::Degenerate {
-        let count = observations.len().min(DIAGNOSED);
-        match diagnose(&observations.matches[..count]) {
-            Degeneracy::RankDeficient => {}
-            reason => return Err(InputError::Degenerate(reason).into()),
-        }
+    // A rotation alone is determined by the points of a line, a translation is not.
+    let some = &poses.inliers[..inliers.min(DIAGNOSED)];
+    let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
+    if verdict.model != Model::PureRotation && observations.is_line(&some, poses.threshold) {
+        return Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()));
     }
-    Ok(estimate)
+    let found = Found {
+        polished,
+        others: &others,
+        of_few: &of_few,
+        verdict,
+        false_matches: &false_matches,
+        iterations,
+        answer,
+    };
+    let estimate = assemble(poses, &found);
+    // A whole family of poses is no pose.
+    estimate.ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))
+}
+
+/// All that an estimate is made of.
+struct Found<'a> {
+    polished: Polished,
+    others: &'a [Alternative],
+    of_few: &'a [Scored],
+    verdict: Verdict,
+    false_matches: &'a [Observations],
+    iterations: usize,
+    answer: Answer,
 }
 
 /// One of the motions of a plane: as its homography has it, and refined as any other motion.
@@ -117,23 +151,26 @@ fn replace(poses: &mut PoseScorer, polished: &mut Polished, others: &mut [Altern
     }
 }
 
-fn assemble(
-    poses: &mut PoseScorer,
-    polished: &Polished,
-    others: &[Alternative],
-    of_few: &[Scored],
-    verdict: &Verdict,
-    iterations: usize,
-) -> Estimate {
+fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
+    let Found { polished, others, of_few, verdict, false_matches, iterations, answer } = *found;
     let observations = poses.observations;
     let sigma = polished.sigma;
-    let mut model = verdict.model;
+    let model = verdict.model;
     let mut motion = polished.scored.motion;
     match model {
         // The homography has the motion of a plane better than the essential matrix.
         Model::Planar if verdict.is_exact_plane => motion = of_plane(others, &motion).unwrap_or(motion),
         Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
         _ => {}
+    }
+    let mut second = match model {
+        Model::PureRotation => None,
+        _ if observations.len() < MANY => second_of_few(of_few, &motion),
+        Model::Planar => other_of_plane(poses, others, &motion),
+        Model::General => None,
+    };
+    if let (Answer::Other, Some(second)) = (answer, &mut second) {
+        std::mem::swap(&mut motion, second);
     }
     let scored = poses.score(motion, poses.threshold);
     if model == Model::PureRotation {
@@ -145,32 +182,24 @@ fn assemble(
     let size = length(observations, &motion, &inliers, sigma);
     let covariance = match model {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
-        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size),
-    };
-    if covariance.is_none() {
-        model = Model::Degenerate;
-    }
+        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size, false_matches),
+    }?;
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {
         mask[observations.order[i as usize]] = true;
     }
-    Estimate {
+    Some(Estimate {
         model,
         pose: with_length(&motion, size),
-        covariance: covariance.unwrap_or_else(covariance::unknown),
+        covariance,
         inlier_count: inliers.len(),
         inliers: mask,
         score: share(&scored, observations),
         iterations,
-        runner_up: match model {
-            Model::PureRotation => None,
-            _ if observations.len() < MANY => second_of_few(poses, of_few, &motion, sigma),
-            Model::Planar => other_of_plane(poses, others, &motion, sigma),
-            _ => None,
-        },
+        runner_up: second.map(|motion| runner_up(poses, motion, sigma)),
         evidence: verdict.evidence,
         noise_px: sigma,
-    }
+    })
 }
 
 /// The motion of the plane that is nearest to a refined motion.
@@ -194,25 +223,19 @@ fn share(scored: &Scored, observations: &Observations) -> f64 {
 }
 
 /// The other motion of the plane, where it is feasible.
-fn other_of_plane(
-    poses: &mut PoseScorer,
-    others: &[Alternative],
-    best: &Motion,
-    sigma: f64,
-) -> Option<RunnerUp> {
+fn other_of_plane(poses: &mut PoseScorer, others: &[Alternative], best: &Motion) -> Option<Motion> {
     poses.score(*best, poses.threshold);
     let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
     let different = others.iter().filter(|a| !is_same(&a.of_plane.motion, best));
     let other = different.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost))?;
-    let other = runner_up(poses, other.of_plane.motion, sigma);
-    (other.inlier_count as f64 >= fewest).then_some(other)
+    let motion = poses.score(other.of_plane.motion, poses.threshold).motion;
+    (poses.inliers.len() as f64 >= fewest).then_some(motion)
 }
 
 /// The next best of the poses that few matches have.
-fn second_of_few(poses: &mut PoseScorer, all: &[Scored], best: &Motion, sigma: f64) -> Option<RunnerUp> {
+fn second_of_few(all: &[Scored], best: &Motion) -> Option<Motion> {
     let different = all.iter().filter(|s| !is_same(&s.motion, best));
-    let other = different.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    Some(runner_up(poses, other.motion, sigma))
+    different.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|s| s.motion)
 }
 
 fn runner_up(poses: &mut PoseScorer, motion: Motion, sigma: f64) -> RunnerUp {

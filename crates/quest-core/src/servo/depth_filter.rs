@@ -10,7 +10,7 @@
 //! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](super::PerFrame).
 
 use super::estimate::{Estimate, HoldReason, PoseEstimator};
-use super::fit::{Fitted, Known, Plane, Workspace};
+use super::fit::{Fitted, Plane, Problem, Workspace};
 use super::reference::DepthReference;
 use super::source::PoseSource;
 use nalgebra::Vector3;
@@ -99,8 +99,8 @@ pub struct DepthFilter<S> {
     workspace: Workspace,
     frame: Vec<Option<[f64; 2]>>,
     proposed: Vec<f64>,
-    /// Of each feature, its places in the first images.
-    first: Vec<Vec<[f64; 2]>>,
+    /// Of each feature, its places in the first images: so many that are set, in a list long enough for all.
+    first: Vec<(usize, Vec<[f64; 2]>)>,
     first_seen: usize,
     matches: Vec<Correspondence>,
     candidates: Candidates,
@@ -129,7 +129,7 @@ impl<S: PoseSource> DepthFilter<S> {
             workspace: Workspace::new(n),
             frame: vec![None; n],
             proposed: vec![1.0; n],
-            first: (0..n).map(|_| Vec::with_capacity(options.first_images)).collect(),
+            first: vec![(0, vec![[0.0; 2]; options.first_images.max(1)]); n],
             first_seen: 0,
             matches: Vec::with_capacity(n),
             candidates: Candidates::new(),
@@ -218,17 +218,19 @@ impl<S: PoseSource> DepthFilter<S> {
 
     /// Collects the first images, and replaces the last of them by their mean.
     fn average_first(&mut self) -> Result<(), HoldReason> {
-        for (places, seen) in self.first.iter_mut().zip(&self.frame) {
-            places.extend(seen.filter(|_| places.len() < places.capacity()));
+        for ((count, places), seen) in self.first.iter_mut().zip(&self.frame) {
+            if let (Some(seen), Some(place)) = (seen, places.get_mut(*count)) {
+                (*place, *count) = (*seen, *count + 1);
+            }
         }
         self.first_seen += 1;
         if self.first_seen < self.options.first_images {
             return Err(HoldReason::Starting);
         }
         let reach = self.options.gate * self.options.noise;
-        for (seen, places) in self.frame.iter_mut().zip(&mut self.first) {
-            *seen = mean_around_median(places, reach).filter(|_| 2 * places.len() > self.first_seen);
-            places.clear();
+        for (seen, (count, places)) in self.frame.iter_mut().zip(&mut self.first) {
+            let found = std::mem::take(count);
+            *seen = mean_around_median(&mut places[..found], reach).filter(|_| 2 * found > self.first_seen);
         }
         self.first_seen = 0;
         if self.seen() < self.options.min_features { Err(HoldReason::TooFewFeatures) } else { Ok(()) }
@@ -257,9 +259,20 @@ impl<S: PoseSource> DepthFilter<S> {
 
     /// Fits the image by one hypothesis, from its last pose.
     fn fit(&mut self, hypothesis: usize) -> Option<Fitted> {
-        let Hypothesis { reference, pose, .. } = &self.hypotheses[hypothesis];
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        self.workspace.fit(&known, &self.frame, reference, *pose)
+        let start = self.hypotheses[hypothesis].pose;
+        self.fit_at(hypothesis, start)
+    }
+
+    /// The same from another pose.
+    fn fit_at(&mut self, hypothesis: usize, start: RelativePose) -> Option<Fitted> {
+        let problem = Problem {
+            goal: &self.goal,
+            frame: &self.frame,
+            reference: &self.hypotheses[hypothesis].reference,
+            sigma: self.sigma,
+            plane: self.options.plane,
+        };
+        self.workspace.fit(&problem, start)
     }
 
     /// Leaves out the feature that disturbs most, until the rest passes or too little is left.
@@ -365,11 +378,14 @@ impl<S: PoseSource> DepthFilter<S> {
     /// there already.
     fn adopt(&mut self, pose: RelativePose) {
         self.spare.reference.set_flat(self.options.spread);
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        let (frame, reference) = (&self.frame, &self.spare.reference);
-        let Some(fitted) = self.workspace.fit_from(&known, frame, reference, pose, &self.proposed) else {
-            return;
+        let problem = Problem {
+            goal: &self.goal,
+            frame: &self.frame,
+            reference: &self.spare.reference,
+            sigma: self.sigma,
+            plane: self.options.plane,
         };
+        let Some(fitted) = self.workspace.fit_from(&problem, pose, &self.proposed) else { return };
         let same = |h: &Hypothesis| {
             h.pose.rotation_error(&fitted.pose) < 1e-3 && (h.pose.t_21 - fitted.pose.t_21).norm() < 1e-3
         };
@@ -390,11 +406,8 @@ impl<S: PoseSource> DepthFilter<S> {
     fn search(&mut self) -> Result<(), HoldReason> {
         self.solve()?;
         let mut best: Option<Fitted> = None;
-        let known = Known { goal: &self.goal, sigma: self.sigma, plane: self.options.plane };
-        for candidate in self.candidates.iter() {
-            let reference = &self.hypotheses[0].reference;
-            let fitted = self.workspace.fit(&known, &self.frame, reference, candidate.pose);
-            if let Some(fitted) = fitted
+        for k in 0..self.candidates.len() {
+            if let Some(fitted) = self.fit_at(0, self.candidates[k].pose)
                 && best.is_none_or(|b| fitted.cost < b.cost)
             {
                 best = Some(fitted);

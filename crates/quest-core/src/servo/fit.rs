@@ -31,10 +31,14 @@ pub struct Plane {
     pub height: f64,
 }
 
-/// What is known before a frame is looked at.
-pub(super) struct Known<'a> {
+/// One frame, and what is known before it is looked at.
+pub(super) struct Problem<'a> {
     /// The goal's features on the plane z = 1.
     pub(super) goal: &'a [[f64; 2]],
+    /// The current camera's; `None` for features that are not seen.
+    pub(super) frame: &'a [Option<[f64; 2]>],
+    /// The inverse depths at the goal.
+    pub(super) reference: &'a DepthReference,
     /// Standard deviation of a coordinate of `m2 − π(…)`.
     pub(super) sigma: f64,
     pub(super) plane: Option<Plane>,
@@ -86,32 +90,24 @@ impl Workspace {
         }
     }
 
-    /// Fits from this pose and the reference's inverse depths. `frame` holds `None` for features that are not seen.
-    pub(super) fn fit(
-        &mut self,
-        known: &Known<'_>,
-        frame: &[Option<[f64; 2]>],
-        reference: &DepthReference,
-        start: RelativePose,
-    ) -> Option<Fitted> {
-        self.fit_from(known, frame, reference, start, &reference.inverse_depths)
+    /// Fits from this pose and the reference's inverse depths.
+    pub(super) fn fit(&mut self, problem: &Problem<'_>, start: RelativePose) -> Option<Fitted> {
+        self.fit_from(problem, start, &problem.reference.inverse_depths)
     }
 
     /// The same from other inverse depths.
     pub(super) fn fit_from(
         &mut self,
-        known: &Known<'_>,
-        frame: &[Option<[f64; 2]>],
-        reference: &DepthReference,
+        problem: &Problem<'_>,
         start: RelativePose,
         inverse_depths: &[f64],
     ) -> Option<Fitted> {
         self.inverse_depths.copy_from_slice(inverse_depths);
         let mut pose = start;
-        let mut cost = self.linearise(known, frame, reference, &pose)?;
+        let mut cost = self.linearise(problem, &pose)?;
         let mut damping = 0.0;
         for _ in 0..MAX_STEPS {
-            let Some(step) = self.solve(reference, damping) else {
+            let Some(step) = self.solve(problem.reference, damping) else {
                 damping = f64::max(10.0 * damping, 1e-4);
                 continue;
             };
@@ -121,12 +117,12 @@ impl Workspace {
             for ((new, old), by) in self.inverse_depths.iter_mut().zip(&kept).zip(&self.step) {
                 *new = old + by;
             }
-            let change = self.cost(known, frame, reference, &moved).map(|new| cost - new);
+            let change = self.cost(problem, &moved).map(|new| cost - new);
             match change {
                 Some(change) if change >= 0.0 => {
                     self.trial = kept;
                     pose = moved;
-                    cost = self.linearise(known, frame, reference, &pose)?;
+                    cost = self.linearise(problem, &pose)?;
                     damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
                     if change <= 1e-4 * cost + 1e-9 {
                         break;
@@ -143,31 +139,26 @@ impl Workspace {
             }
         }
         // The last trial may have been refused: the residuals are those of the pose that is returned.
-        self.cost(known, frame, reference, &pose)?;
-        let covariance = self.marginal(reference)?;
+        self.cost(problem, &pose)?;
+        let covariance = self.marginal(problem.reference)?;
         Some(Fitted { pose, cost, covariance })
     }
 
     /// The residuals and the cost, at the workspace's inverse depths; `None` where a seen point is behind the camera.
-    fn cost(
-        &mut self,
-        known: &Known<'_>,
-        frame: &[Option<[f64; 2]>],
-        reference: &DepthReference,
-        pose: &RelativePose,
-    ) -> Option<f64> {
+    fn cost(&mut self, problem: &Problem<'_>, pose: &RelativePose) -> Option<f64> {
+        let Problem { goal, frame, reference, sigma, plane } = *problem;
         let r_21 = pose.r_21();
-        let mut cost = known.plane.map_or(0.0, |plane| plane_residuals(&plane, pose).0.norm_squared());
-        for (i, (goal, image)) in known.goal.iter().zip(frame).enumerate() {
+        let mut cost = plane.map_or(0.0, |plane| plane_residuals(&plane, pose).0.norm_squared());
+        for (i, (m1, image)) in goal.iter().zip(frame).enumerate() {
             let rho = self.inverse_depths[i];
             cost += reference.pull(i, &self.inverse_depths) * (rho - reference.inverse_depths[i]);
             self.squares[i] = f64::INFINITY;
             let Some(image) = image else { continue };
-            let x2 = r_21 * Vector3::new(goal[0], goal[1], 1.0) + pose.t_21 * rho;
+            let x2 = r_21 * Vector3::new(m1[0], m1[1], 1.0) + pose.t_21 * rho;
             if x2.z < NEAREST {
                 return None;
             }
-            let off = [x2.x / x2.z - image[0], x2.y / x2.z - image[1]].map(|e| e / known.sigma);
+            let off = [x2.x / x2.z - image[0], x2.y / x2.z - image[1]].map(|e| e / sigma);
             self.squares[i] = off[0] * off[0] + off[1] * off[1];
             cost += self.squares[i];
         }
@@ -177,34 +168,29 @@ impl Workspace {
     }
 
     /// The normal equations at this pose and the workspace's inverse depths, and the cost.
-    fn linearise(
-        &mut self,
-        known: &Known<'_>,
-        frame: &[Option<[f64; 2]>],
-        reference: &DepthReference,
-        pose: &RelativePose,
-    ) -> Option<f64> {
-        let cost = self.cost(known, frame, reference, pose)?;
+    fn linearise(&mut self, problem: &Problem<'_>, pose: &RelativePose) -> Option<f64> {
+        let cost = self.cost(problem, pose)?;
+        let Problem { goal, frame, reference, sigma, plane } = *problem;
         let r_21 = pose.r_21();
         let drift: f64 = self.inverse_depths.iter().map(|rho| rho - 1.0).sum();
         (self.pose_block, self.gradient) = (Matrix6::zeros(), Vector6::zeros());
-        if let Some(plane) = &known.plane {
+        if let Some(plane) = &plane {
             let (residuals, jacobian) = plane_residuals(plane, pose);
             self.pose_block += jacobian.transpose() * jacobian;
             self.gradient += jacobian.transpose() * residuals;
         }
-        for (i, (goal, image)) in known.goal.iter().zip(frame).enumerate() {
+        for (i, (m1, image)) in goal.iter().zip(frame).enumerate() {
             let rho = self.inverse_depths[i];
             let pull = reference.pull(i, &self.inverse_depths) + UNIT_WEIGHT * drift;
             (self.mixed[i], self.diagonal[i]) = ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, pull], 0.0);
             let Some(image) = image else { continue };
-            let c = r_21 * Vector3::new(goal[0], goal[1], 1.0);
+            let c = r_21 * Vector3::new(m1[0], m1[1], 1.0);
             let x2 = c + pose.t_21 * rho;
-            let weight = 1.0 / (x2.z * known.sigma);
+            let weight = 1.0 / (x2.z * sigma);
             let u = [x2.x / x2.z, x2.y / x2.z];
             let rows = [Vector3::new(weight, 0.0, -u[0] * weight), Vector3::new(0.0, weight, -u[1] * weight)];
             for (row, off) in rows.iter().zip([u[0] - image[0], u[1] - image[1]]) {
-                let off = off / known.sigma;
+                let off = off / sigma;
                 let (by_turn, by_t, by_rho) = (c.cross(row), row * rho, row.dot(&pose.t_21));
                 let j = Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_t.x, by_t.y, by_t.z);
                 self.pose_block.ger(1.0, &j, &j, 1.0);

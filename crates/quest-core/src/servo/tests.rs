@@ -192,6 +192,23 @@ fn no_image_makes_a_wild_command() {
     }
 }
 
+/// A copy of an estimator that has seen nothing works as the original does.
+#[test]
+fn a_clone_averages_the_first_images_too() {
+    let rng = &mut scenario::generator(7, 0);
+    let (world, plant) = robot(rng, 8, &Disturbances { noise_px: 0.5, ..Disturbances::default() });
+    let goal = world.on_plane(&world.goal_pixels(rng));
+    let mut original = DepthFilter::new(&goal, SolverName::Quest, world.filter_options(&LIMITS, 2.0));
+    let mut copy = original.clone();
+    let image: Vec<_> = world.points.iter().map(|x1| plant.pose().q_21 * x1 + plant.pose().t_21).collect();
+    let image: Vec<_> = image.iter().map(|x2| Some([x2.x / x2.z, x2.y / x2.z])).collect();
+    for index in 0..12 {
+        let expected = original.estimate(&image);
+        assert_eq!(copy.estimate(&image), expected, "image {index}");
+        assert_eq!(expected.is_ok(), index >= 9, "image {index}: {expected:?}");
+    }
+}
+
 /// Turning gives way to features at the border.
 #[test]
 fn turns_do_not_push_features_out() {

@@ -62,7 +62,7 @@ const FIRST_USED: usize = 4;
 const VARIABLES: [[u8; 4]; 4] = homogeneous::<4>(1);
 
 /// The quadratic monomial of two variables.
-const SQUARE: [[usize; 4]; 4] = {
+pub(crate) const SQUARE: [[usize; 4]; 4] = {
     let mut table = [[0; 4]; 4];
     let mut a = 0;
     while a < 16 {
@@ -73,7 +73,7 @@ const SQUARE: [[usize; 4]; 4] = {
 };
 
 /// The cubic monomial of a quadratic one and a variable.
-const PRODUCT: [[usize; 4]; 10] = {
+pub(crate) const PRODUCT: [[usize; 4]; 10] = {
     let mut table = [[0; 4]; 10];
     let mut a = 0;
     while a < 40 {

@@ -28,18 +28,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::aligned::Alignment;
 use super::essential::decompose;
 use super::five_point::unit;
 use super::least_squares::{null_vector, outer};
 use super::motion::Motion;
 use super::normalisation::Normalisation;
-use super::shortlist::{Shortlist, pure_rotation};
+use super::shortlist::{Shortlist, is_answered};
 use super::{Kinds, PoseSolver};
 use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::degeneracy::diagnose_fewer_than;
 use crate::epipolar_frame::tangent_basis;
-use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+use crate::{CandidateKind, Candidates, Correspondence};
 
 /// Hartley's normalised eight-point method; its steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,12 +49,8 @@ impl PoseSolver for EightPoint {
     const MIN_MATCHES: usize = 8;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        out.clear();
-        if matches.len() < Self::MIN_MATCHES {
-            return out.set_degeneracy(Degeneracy::TooFewMatches);
-        }
-        if let Some(alignment) = Alignment::of_pure_rotation(matches) {
-            return pure_rotation(&alignment, matches, out);
+        if is_answered(Self::MIN_MATCHES, matches, out) {
+            return;
         }
         match motion(matches) {
             None => out.set_degeneracy(diagnose_fewer_than(Self::MIN_MATCHES, matches)),

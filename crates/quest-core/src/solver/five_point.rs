@@ -22,7 +22,7 @@ use super::cubics::combine;
 use super::essential::{decompose, real_part, twisted};
 use super::least_squares::{outer, principal_basis};
 use super::motion::Motion;
-use super::shortlist::{Shortlist, pure_rotation};
+use super::shortlist::{Shortlist, is_answered};
 use super::trace_cubics::Basis;
 use crate::algebra::null_space;
 use crate::degeneracy::diagnose;
@@ -39,12 +39,8 @@ pub(crate) fn solve(
     out: &mut Candidates,
     method: impl Fn(&mut Solutions) -> bool,
 ) {
-    out.clear();
-    if matches.len() < MIN_MATCHES {
-        return out.set_degeneracy(Degeneracy::TooFewMatches);
-    }
-    if let Some(alignment) = Alignment::of_pure_rotation(matches) {
-        return pure_rotation(&alignment, matches, out);
+    if is_answered(MIN_MATCHES, matches, out) {
+        return;
     }
     let basis = match null_space(matches) {
         Err(degeneracy) => return out.set_degeneracy(degeneracy),

@@ -33,16 +33,16 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::aligned::{Alignment, DEPENDENT};
+use super::aligned::DEPENDENT;
 use super::least_squares::{null_vector, outer};
 use super::motion::Motion;
 use super::normalisation::Normalisation;
-use super::shortlist::{Shortlist, pure_rotation};
+use super::shortlist::{Shortlist, is_answered};
 use super::{Kinds, PoseSolver};
 use crate::algebra::symmetric::eigen_3;
 use crate::degeneracy::diagnose_fewer_than;
 use crate::epipolar_frame::tangent_basis;
-use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
+use crate::{CandidateKind, Candidates, Correspondence};
 
 /// The motions of a plane; the steps stand at the head of the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,12 +53,8 @@ impl PoseSolver for Homography {
     const MIN_MATCHES: usize = 4;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        out.clear();
-        if matches.len() < Self::MIN_MATCHES {
-            return out.set_degeneracy(Degeneracy::TooFewMatches);
-        }
-        if let Some(alignment) = Alignment::of_pure_rotation(matches) {
-            return pure_rotation(&alignment, matches, out);
+        if is_answered(Self::MIN_MATCHES, matches, out) {
+            return;
         }
         let Some(homography) = homography(matches) else {
             return out.set_degeneracy(diagnose_fewer_than(Self::MIN_MATCHES, matches));

@@ -285,19 +285,13 @@ impl Twins {
 mod tests {
     use super::*;
     use crate::quaternion::minors_without_q;
-
-    fn five() -> [Correspondence; 5] {
-        std::array::from_fn(|k| {
-            let s = k as f64 + 1.0;
-            let x1 = [(1.7 * s).sin(), (2.9 * s).cos(), 1.0];
-            let x2 = [(0.6 * s).cos(), (4.1 * s).sin(), 1.0];
-            Correspondence::from_bearings(x1, x2).unwrap()
-        })
-    }
+    use crate::simulate::{Scene, SceneOptions};
 
     #[test]
     fn every_eigenvalue_is_a_common_zero_of_all_fifteen_quartics() {
-        let matches = five();
+        let scene =
+            Scene::generate(&SceneOptions { noise_px: 0.75, ..SceneOptions::default() }, 112, 0).unwrap();
+        let matches: [Correspondence; 5] = scene.matches.try_into().unwrap();
         let ten = ten_quartics(&matches);
         let minors = minors_without_q(&matches.map(|m| bilinear(&(m.bearing2() * m.bearing1().transpose()))));
         let action = action(&fifteen_relations(&ten).unwrap());

@@ -4,15 +4,12 @@
 //! no minor adds up to anything, `Σ_p w_p minor(p) = 0`, the monomials `x = Σ_p w_p monomials(p)` are in the null space of
 //! the matrix of their coefficients; so that no coefficient is needed.
 
+use std::array::from_fn;
+
 use nalgebra::Matrix4;
 
+use crate::algebra::two::Two;
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
-
-/// How many points are taken at once: what fits into the registers.
-const LANES: usize = 4;
-
-/// Values at some of the points.
-type Lanes = [f64; LANES];
 
 /// The points, without symmetry: multiples of four numbers, less their integer parts. Among some thousand such choices that of
 /// the best conditioned monomials: 271.
@@ -60,72 +57,71 @@ const MONOMIALS_AT: [Quartic; 35] = {
 /// The minors (rows) at the points (columns).
 pub(crate) fn minors_at_points(m: &[Matrix4<f64>; 6]) -> [[f64; 35]; 35] {
     let mut out = [[0.0; 35]; 35];
-    for start in (0..35).step_by(LANES) {
-        let lanes = LANES.min(35 - start);
-        let points = &POINTS[start..start + lanes];
-        let minors = minors(&columns(m, points));
-        for (row, minor) in out.iter_mut().zip(&minors) {
-            row[start..start + lanes].copy_from_slice(&minor[..lanes]);
+    for (k, points) in POINTS.chunks(2).enumerate() {
+        let second = points.get(1).unwrap_or(&points[0]);
+        let q: [Two; 4] = from_fn(|i| Two::new([points[0][i], second[i]]));
+        for (row, minor) in out.iter_mut().zip(&minors(&columns(m, &q))) {
+            row[2 * k..][..points.len()].copy_from_slice(&minor.to_array()[..points.len()]);
         }
     }
     out
 }
 
-/// The columns `q, M_1 q, …, M_6 q` at up to [`LANES`] points.
-fn columns(m: &[Matrix4<f64>; 6], points: &[[f64; 4]]) -> [[Lanes; 4]; 7] {
-    let mut columns = [[[0.0; LANES]; 4]; 7];
-    for (lane, point) in points.iter().enumerate() {
-        for i in 0..4 {
-            columns[0][i][lane] = point[i];
-        }
-    }
-    for (n, m) in m.iter().enumerate() {
-        for i in 0..4 {
-            let mut sum = [0.0; LANES];
-            for j in 0..4 {
-                for lane in 0..LANES {
-                    sum[lane] += m[(i, j)] * columns[0][j][lane];
-                }
-            }
-            columns[n + 1][i] = sum;
-        }
-    }
-    columns
+/// The columns `q, M_1 q, …, M_6 q` at two points.
+fn columns(m: &[Matrix4<f64>; 6], q: &[Two; 4]) -> [[Two; 4]; 7] {
+    let times = |m: &Matrix4<f64>| -> [Two; 4] {
+        from_fn(|i| (1..4).fold(q[0] * m[(i, 0)], |sum, j| sum + q[j] * m[(i, j)]))
+    };
+    from_fn(|n| if n == 0 { *q } else { times(&m[n - 1]) })
 }
+
+/// Pairs of seven columns.
+const PAIRS: [[usize; 2]; 21] = {
+    let mut pairs = [[0; 2]; 21];
+    let (mut n, mut i, mut j) = (0, 0, 1);
+    while n < 21 {
+        pairs[n] = [i, j];
+        n += 1;
+        j += 1;
+        if j == 7 {
+            i += 1;
+            j = i + 1;
+        }
+    }
+    pairs
+};
+
+/// The quadruples of columns, in lexicographic order, as places of two [`PAIRS`].
+const QUADRUPLES: [[usize; 2]; 35] = {
+    let mut quadruples = [[0; 2]; 35];
+    let (mut n, mut first) = (0, 0);
+    while first < 21 {
+        let mut second = first;
+        while second < 21 {
+            if PAIRS[second][0] > PAIRS[first][1] {
+                quadruples[n] = [first, second];
+                n += 1;
+            }
+            second += 1;
+        }
+        first += 1;
+    }
+    assert!(n == 35);
+    quadruples
+};
 
 /// All 4 × 4 minors of seven columns, by Laplace expansion along the first two of them.
-fn minors(columns: &[[Lanes; 4]; 7]) -> [Lanes; 35] {
-    /// Rows of a 2 × 2 minor; the other two stand at the mirrored place.
-    const ROWS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-    const SIGNS: [f64; 6] = [1.0, -1.0, 1.0, 1.0, -1.0, 1.0];
-    let mut wedges = [[[[0.0; LANES]; 6]; 7]; 7];
-    for i in 0..6 {
-        for j in i + 1..7 {
-            for (wedge, (a, b)) in wedges[i][j].iter_mut().zip(ROWS) {
-                for lane in 0..LANES {
-                    wedge[lane] =
-                        columns[i][a][lane] * columns[j][b][lane] - columns[i][b][lane] * columns[j][a][lane];
-                }
-            }
-        }
-    }
-    let mut out = [[0.0; LANES]; 35];
-    let mut row = 0;
-    for i in 0..4 {
-        for j in i + 1..5 {
-            for k in j + 1..6 {
-                for l in k + 1..7 {
-                    for n in 0..6 {
-                        for lane in 0..LANES {
-                            out[row][lane] += SIGNS[n] * wedges[i][j][n][lane] * wedges[k][l][5 - n][lane];
-                        }
-                    }
-                    row += 1;
-                }
-            }
-        }
-    }
-    out
+fn minors(columns: &[[Two; 4]; 7]) -> [Two; 35] {
+    // 2 × 2 minors, of the rows 01, 02, 03, 12, 13, 23; those of the other two rows stand at the mirrored place.
+    let wedges = PAIRS.map(|[i, j]| {
+        let (x, y) = (&columns[i], &columns[j]);
+        let minor = |a: usize, b: usize| x[a] * y[b] - x[b] * y[a];
+        [minor(0, 1), minor(0, 2), minor(0, 3), minor(1, 2), minor(1, 3), minor(2, 3)]
+    });
+    QUADRUPLES.map(|[first, second]| {
+        let (x, y) = (&wedges[first], &wedges[second]);
+        x[0] * y[5] - x[1] * y[4] + x[2] * y[3] + x[3] * y[2] - x[4] * y[1] + x[5] * y[0]
+    })
 }
 
 /// The monomials that weights of the points add up to.
@@ -153,11 +149,11 @@ mod tests {
     #[test]
     fn minors_are_determinants() {
         let entry = |n: usize, i: usize, j: usize| ((n + 1) as f64 * (i * 4 + j + 1) as f64).sin();
-        let m: [Matrix4<f64>; 6] = std::array::from_fn(|n| Matrix4::from_fn(|i, j| entry(n, i, j)));
+        let m: [Matrix4<f64>; 6] = from_fn(|n| Matrix4::from_fn(|i, j| entry(n, i, j)));
         let minors = minors_at_points(&m);
         for (p, point) in POINTS.iter().enumerate() {
             let q = Vector4::from(*point);
-            let columns: [Vector4<f64>; 7] = std::array::from_fn(|n| if n == 0 { q } else { m[n - 1] * q });
+            let columns: [Vector4<f64>; 7] = from_fn(|n| if n == 0 { q } else { m[n - 1] * q });
             let mut row = 0;
             for (i, j, k, l) in quadruples() {
                 let determinant =

@@ -2,7 +2,7 @@
 
 mod aligned;
 mod consensus;
-mod cubics;
+pub(crate) mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
 mod five_point;

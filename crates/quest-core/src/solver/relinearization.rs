@@ -20,7 +20,8 @@
 //! - *Five matches*, 20 directions: `D̄` is 465 × 210, and its null space comes from an elimination of 15 × 35 (`moments.rs`).
 //! - *More*: the six combinations of all constraints that the matches determine best have 35 minors (`minor_values.rs`). The paper
 //!   has two solutions here. With noise the minors leave no direction quite open, and the four shortest hold the solutions
-//!   better than the two shortest: `D̄` is 465 × 10, its four shortest directions in place of null vectors make two
+//!   better than the two shortest: `D̄` has ten columns, the squares of which follow from the four directions without its 465
+//!   rows; its four shortest directions in place of null vectors make two
 //!   solutions and two that mean nothing, and all are refined over all matches. Points of a plane leave more directions than
 //!   that: where a homography explains the matches its two motions are refined as well. Where nothing fits, the motion on
 //!   which most matches agree is added (`consensus.rs`).
@@ -32,7 +33,7 @@
 //! **Solutions**: twenty rotations for five matches, counting complex ones, a pair of which is one candidate; for more two, and
 //! other local minima that were found beside them; and the rotation-only candidate.
 
-use nalgebra::{ComplexField, Quaternion, UnitQuaternion};
+use nalgebra::{ComplexField, Matrix4, Quaternion, SMatrix, UnitQuaternion};
 
 use super::aligned::Coordinates;
 use super::consensus::AGREEMENT;
@@ -47,7 +48,7 @@ use super::twenty::from_five;
 use super::{Kinds, PoseSolver, refining};
 use crate::algebra::eigenvalues::Hessenberg;
 use crate::algebra::elimination;
-use crate::algebra::monomials::{position, sum};
+use crate::algebra::monomials::{homogeneous, position};
 use crate::algebra::singular::shortest_directions;
 use crate::quaternion::bilinear;
 use crate::quaternion::monomials::{MONOMIALS, Quartic};
@@ -88,35 +89,22 @@ fn rows(gram: &Gram, [n1, n2, n3, n4, n5, n6, ..]: &[Coordinates; 9]) -> [[f64; 
     minors_at_points(&[n1, n2, n3, n4, n5, n6].map(|row| bilinear(&gram.alignment.constraint(row))))
 }
 
-/// The index of a monomial of degree 8 in lexicographic order.
-const fn octic([_, b, c, d]: [u8; 4]) -> usize {
-    let (three, two, one) = ((b + c + d) as usize, (c + d) as usize, d as usize);
-    three * (three + 1) * (three + 2) / 6 + two * (two + 1) / 2 + one
-}
-
-/// The 465 relations `x_a x_b = x_c x_d` of commutativity, as `[a, b, c, d]`.
-const RELATIONS: [[u8; 4]; 465] = {
-    let mut first = [[255; 2]; 165];
-    let mut relations = [[0; 4]; 465];
-    let mut n = 0;
-    let mut a = 0;
-    while a < 35 {
-        let mut b = a;
-        while b < 35 {
-            let place = octic(sum(MONOMIALS[a as usize], MONOMIALS[b as usize]));
-            let [c, d] = first[place];
-            if c == 255 {
-                first[place] = [a, b];
-            } else {
-                relations[n] = [a, b, c, d];
-                n += 1;
-            }
-            b += 1;
+/// `FACTORED[l][m]`: the place in `x` of `q_l` times the cubic monomial `m`.
+const FACTORED: [[usize; 20]; 4] = {
+    const CUBIC: [[u8; 4]; 20] = homogeneous(3);
+    let mut table = [[0; 20]; 4];
+    let mut l = 0;
+    while l < 4 {
+        let mut m = 0;
+        while m < 20 {
+            let mut product = CUBIC[m];
+            product[l] += 1;
+            table[l][m] = position(&MONOMIALS, product);
+            m += 1;
         }
-        a += 1;
+        l += 1;
     }
-    assert!(n == 465);
-    relations
+    table
 };
 
 /// `(q·q)²` as a form on `x`.
@@ -188,27 +176,33 @@ fn rotation(kind: CandidateKind, [w, x, y, z]: [f64; 4]) -> Option<(CandidateKin
     q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
 }
 
-/// `D̄` for four directions.
-fn relinearized(v: &[Quartic; 4]) -> [[f64; 10]; RELATIONS.len()] {
-    RELATIONS.map(|relation| {
-        let [a, b, c, d] = relation.map(usize::from);
-        let mut row = [0.0; 10];
-        for i in 0..4 {
-            for j in i..4 {
-                row[PAIR[i][j]] = if i == j {
-                    v[i][a] * v[i][b] - v[i][c] * v[i][d]
-                } else {
-                    v[i][a] * v[j][b] + v[j][a] * v[i][b] - v[i][c] * v[j][d] - v[j][c] * v[i][d]
-                };
+/// `2 D̄ᵀ D̄` for four directions.
+///
+/// That monomials commute, `(q_l f)(q_k g) = (q_k f)(q_l g)` for cubic monomials `f` and `g`, are the 2 × 2 minors of the matrix
+/// `x(q_l f)`, 4 × 20. With `A_i` that matrix of `v_i`, the products of two columns of `D̄`, summed over all minors, are
+/// `(A_i · A_m)(A_j · A_n) − tr(A_i A_mᵀ A_j A_nᵀ)` and the same with `m` and `n` exchanged.
+fn relinearized(v: &[Quartic; 4]) -> [[f64; 10]; 10] {
+    let a = v.map(|v| SMatrix::<f64, 4, 20>::from_fn(|l, f| v[FACTORED[l][f]]));
+    let g: [[Matrix4<f64>; 4]; 4] = a.map(|a_i| a.map(|a_m| a_i * a_m.transpose()));
+    let trace = g.map(|row| row.map(|g| g.trace()));
+    // g[n][j] is the transpose of g[j][n]: the trace of a product is a sum over entries.
+    let product = |[i, m]: [usize; 2], [j, n]: [usize; 2]| trace[i][m] * trace[j][n] - g[i][m].dot(&g[n][j]);
+    let mut squares = [[0.0; 10]; 10];
+    for (i, row) in PAIR.iter().enumerate() {
+        for (j, &left) in row.iter().enumerate() {
+            for (m, row) in PAIR.iter().enumerate() {
+                for (n, &right) in row.iter().enumerate() {
+                    squares[left][right] += product([i, m], [j, n]);
+                }
             }
         }
-        row
-    })
+    }
+    squares
 }
 
 /// The quaternion, of any scale, from the values of the quartic monomials: the row of the largest fourth power.
 fn quaternion<T: ComplexField<RealField = f64> + Copy>(x: &[T; 35]) -> [T; 4] {
-    const ROWS: [[usize; 4]; 4] = {
+    const RATIOS: [[usize; 4]; 4] = {
         let mut rows = [[0; 4]; 4];
         let mut k = 0;
         while k < 4 {
@@ -224,16 +218,16 @@ fn quaternion<T: ComplexField<RealField = f64> + Copy>(x: &[T; 35]) -> [T; 4] {
         }
         rows
     };
-    let size = |k: usize| x[ROWS[k][k]].norm1();
+    let size = |k: usize| x[RATIOS[k][k]].norm1();
     let k = (1..4).fold(0, |best, k| if size(k) > size(best) { k } else { best });
-    ROWS[k].map(|place| x[place])
+    RATIOS[k].map(|place| x[place])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::simulate::{Scene, SceneOptions};
-    use nalgebra::{SMatrix, SVector};
+    use nalgebra::SVector;
 
     const SEED: u64 = 110;
 
@@ -246,9 +240,7 @@ mod tests {
     fn monomials_commute() {
         let q = UnitQuaternion::new_normalize(Quaternion::new(0.4, -0.7, 0.3, 0.9));
         let x = veronese(&q);
-        for [a, b, c, d] in RELATIONS.map(|relation| relation.map(usize::from)) {
-            assert!((x[a] * x[b] - x[c] * x[d]).abs() < 1e-16);
-        }
+        assert!(relinearized(&[x; 4]).as_flattened().iter().all(|product| product.abs() < 1e-14));
         let found = rotation(CandidateKind::Exact, quaternion(&x)).unwrap().1;
         assert!(found.angle_to(&q) < 1e-7);
     }

@@ -245,6 +245,22 @@ pub(crate) fn rotation_only(
     candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
+/// Empties `out` and answers too few matches and exact pure rotations, which no solver needs to look at; whether it did.
+pub(crate) fn is_answered(least: usize, matches: &[Correspondence], out: &mut Candidates) -> bool {
+    out.clear();
+    if matches.len() < least {
+        out.set_degeneracy(Degeneracy::TooFewMatches);
+        return true;
+    }
+    match Alignment::of_pure_rotation(matches) {
+        None => false,
+        Some(alignment) => {
+            pure_rotation(&alignment, matches, out);
+            true
+        }
+    }
+}
+
 /// The one candidate of an exact pure rotation, unless the matches leave that undetermined too.
 pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], out: &mut Candidates) {
     if all_parallel(matches) {
@@ -258,7 +274,7 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
-#[expect(clippy::needless_bitwise_bool, reason = "a branch would be mispredicted half of the time")]
+#[expect(clippy::needless_bitwise_bool, reason = "no branches: which comes first cannot be predicted")]
 pub(crate) fn rank(out: &mut Candidates) {
     // Positive numbers are ordered as their bits are: keys are compared as integers, without branches.
     let mut keys = [[0; 3]; Candidates::CAPACITY];

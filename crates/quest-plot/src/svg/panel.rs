@@ -2,13 +2,13 @@
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
-use plotters::element::{Circle, Cross, DashedPathElement};
+use plotters::element::{Circle, Cross};
 use plotters::prelude::Cartesian2d;
 use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, TRANSPARENT};
 
 use super::ink::{self, Weight};
-use super::{Canvas, FINE, drawing};
+use super::{Canvas, DASHED_WIDTH, FINE, drawing};
 use crate::axis::Ruler;
 use crate::colour::{GRID, INK, MUTED};
 use crate::label::spread;
@@ -113,7 +113,10 @@ fn draw_series(
     }
     let dots = || series.points.iter().filter(|p| is_inside(p)).map(|p| here(*p));
     let tenths = if series.style == Style::Thick { 26 } else { 15 };
-    let stroke = ink::stroke(series.colour, tenths, 1.0);
+    let mut stroke = ink::stroke(series.colour, tenths, 1.0);
+    if series.style == Style::Dashed {
+        stroke.stroke_width = DASHED_WIDTH.unsigned_abs();
+    }
     match series.style {
         Style::Points => dots().try_for_each(|p| {
             canvas
@@ -125,13 +128,7 @@ fn draw_series(
         }
         Style::Line | Style::Thick | Style::Dashed => {
             for run in series.points.split(|p| !is_inside(p)).filter(|run| run.len() > 1) {
-                let run: Vec<_> = run.iter().map(|p| here(*p)).collect();
-                if series.style == Style::Dashed {
-                    let dashes = DashedPathElement::new(run, 6 * FINE, 4 * FINE, stroke);
-                    canvas.draw(&dashes).map_err(drawing)?;
-                } else {
-                    ink::path(canvas, run, stroke)?;
-                }
+                ink::path(canvas, run.iter().map(|p| here(*p)).collect(), stroke)?;
             }
             Ok(())
         }

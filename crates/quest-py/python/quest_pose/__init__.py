@@ -13,8 +13,8 @@ forward).
 >>> camera.bearing([[514, 384]])
 array([[0., 0., 1.]])
 
-``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``solve`` the
-candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a
+``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``third_view``
+decides between two possible poses, ``solve`` finds the candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a
 ``QuestError``.
 """
 
@@ -39,6 +39,7 @@ from quest_pose._core import (
     __version__,
     _solve_batch,
     _solvers,
+    _third_view,
     constraint_matrix,
     estimate,
     estimate_batch,
@@ -59,6 +60,7 @@ __all__ = [
     "ShapeMismatch",
     "SolvedBatch",
     "SolverInfo",
+    "ThirdView",
     "TooFewMatches",
     "__version__",
     "constraint_matrix",
@@ -67,6 +69,7 @@ __all__ = [
     "solve",
     "solve_batch",
     "solvers",
+    "third_view",
 ]
 
 
@@ -153,3 +156,61 @@ def solve_batch(x1: ArrayLike, x2: ArrayLike) -> SolvedBatch:
     The lock of the interpreter is released while the solver works.
     """
     return SolvedBatch(*_solve_batch(x1, x2))
+
+
+class ThirdView(NamedTuple):
+    """What three views of the same points say."""
+
+    estimate_21: Estimate
+    """From view 1 to view 2; the runner-up is the pose that the third view speaks against."""
+    estimate_31: Estimate
+    """From view 1 to view 3."""
+    disagreement: float | None
+    """How far the depths of the two pairs are apart, in units of the noise; None where nothing was decided."""
+    next_best: float | None
+    """The same with the other pose from view 1 to view 2, infinite where there is none."""
+    ratio: float | None
+    """The length of the translation to view 3 over that to view 2, in one common scale."""
+
+
+def third_view(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    x3: ArrayLike,
+    camera1: Camera | ArrayLike | None = None,
+    camera2: Camera | ArrayLike | None = None,
+    camera3: Camera | ArrayLike | None = None,
+    *,
+    threshold: float | None = None,
+    confidence: float = 0.9999,
+    max_iterations: int = 100_000,
+    seed: int = 0,
+) -> ThirdView:
+    """The poses from view 1 to views 2 and 3; where one of two views is ambiguous, the other decides.
+
+    Points on a plane, and few points, have two possible poses. The depths in view 1 do not depend on where the other
+    camera is: the poses of the two pairs are chosen so that they agree.
+
+    Parameters
+    ----------
+    x1, x2, x3 : array_like of shape (N, 2) or (N, 3)
+        The same N points in three views, as for ``estimate``.
+    camera1, camera2, camera3 : Camera or array_like of shape (3, 3), optional
+        The cameras, or their matrices K. The second and the third are ``camera1`` where absent.
+    threshold, confidence, max_iterations, seed
+        As for ``estimate``.
+
+    Returns
+    -------
+    ThirdView
+        Named fields. ``disagreement`` close to ``next_best`` does not decide. Where fewer than five points are
+        inliers of both pairs, or a camera only turned, nothing does.
+
+    Raises
+    ------
+    NoPose, TooFewMatches, NotFinite, ShapeMismatch, DegenerateInput, BadCamera, QuestError
+        As ``estimate``, for either pair.
+    """
+    cameras = (camera1, camera2, camera3)
+    first, second, decision = _third_view(x1, x2, x3, cameras, threshold, confidence, max_iterations, seed)
+    return ThirdView(first, second, *(decision or (None, None, None)))

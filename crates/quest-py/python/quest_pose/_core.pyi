@@ -27,6 +27,7 @@ __all__ = [
     "_runner_up",
     "_solve_batch",
     "_solvers",
+    "_third_view",
     "constraint_matrix",
     "estimate",
     "estimate_batch",
@@ -39,7 +40,7 @@ _Array: TypeAlias = NDArray[np.float64]
 _Bools: TypeAlias = NDArray[np.bool_]
 _Counts: TypeAlias = NDArray[np.uint64]
 _Kind: TypeAlias = Literal["exact", "from_complex", "rotation_only"]
-_Model: TypeAlias = Literal["general", "planar", "pure_rotation", "degenerate"]
+_Model: TypeAlias = Literal["general", "planar", "pure_rotation"]
 
 class QuestError(ValueError): ...
 class TooFewMatches(QuestError): ...
@@ -238,6 +239,7 @@ def estimate(
     min_iterations: int = 300,
     max_iterations: int = 100_000,
     seed: int = 0,
+    index: int = 0,
     solver: str | None = None,
     scores: ArrayLike | None = None,
     initial_pose: tuple[ArrayLike, ArrayLike] | None = None,
@@ -255,12 +257,23 @@ def estimate_batch(
     min_iterations: int = 300,
     max_iterations: int = 100_000,
     seed: int = 0,
+    first_index: int = 0,
     solver: str | None = None,
     num_threads: int = 0,
 ) -> EstimateBatch: ...
 def _estimate(state: tuple[Any, ...]) -> Estimate: ...
 def _estimate_batch(state: tuple[Any, ...]) -> EstimateBatch: ...
 def _runner_up(state: tuple[Any, ...]) -> RunnerUp: ...
+def _third_view(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    x3: ArrayLike,
+    cameras: Sequence[Camera | ArrayLike | None],
+    threshold: float | None,
+    confidence: float,
+    max_iterations: int,
+    seed: int,
+) -> tuple[Estimate, Estimate, tuple[float, float, float] | None]: ...
 def constraint_matrix(x1: ArrayLike, x2: ArrayLike) -> _Array: ...
 def _solve_batch(
     x1: ArrayLike, x2: ArrayLike

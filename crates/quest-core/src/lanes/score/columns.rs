@@ -19,19 +19,17 @@ pub(super) mod sealed {
     }
 
     pub trait Columns<T> {
-        /// The columns of a block of matches.
-        type Block<'a>: Copy
-        where
-            Self: 'a;
+        /// As many matches as are looked at together.
+        type Block;
 
-        /// A block of matches, filled up with NaN.
-        fn block(&self, index: usize) -> Self::Block<'_>;
+        /// All matches; NaN fill the last block.
+        fn blocks(&self) -> &[Self::Block];
 
-        /// The square of `x2ᵀ E x1` and that of its gradient for the matches from `k` on, as many as there are lanes.
+        /// The square of `x2ᵀ E x1` and that of its gradient for the matches of a block from `k` on, as many as there are lanes.
         fn constraint<L: Lanes<T>>(
             lanes: L,
             e: &[F<L, T>; 9],
-            block: Self::Block<'_>,
+            block: &Self::Block,
             k: usize,
         ) -> (F<L, T>, F<L, T>);
     }
@@ -108,12 +106,12 @@ pub trait MatchColumns<T: Real>: sealed::Columns<T> {
 }
 
 macro_rules! matches {
-    ($name:ident, $dimension:literal, $what:literal) => {
+    ($name:ident, $dimension:literal, $constraint:ident, $what:literal) => {
         impl<T: Real> $name<T> {
             /// No matches.
             #[must_use]
             pub fn new() -> Self {
-                Self { columns: Columns { columns: [const { Vec::new() }; 2 * $dimension], len: 0 } }
+                Self { columns: Columns { blocks: Vec::new(), len: 0 } }
             }
 
             /// Drops all matches, and keeps the memory.
@@ -134,116 +132,100 @@ macro_rules! matches {
                 self.columns.len
             }
         }
+
+        impl<T: Real> sealed::Columns<T> for $name<T> {
+            type Block = Block<T, { 2 * $dimension }>;
+
+            fn blocks(&self) -> &[Self::Block] {
+                &self.columns.blocks
+            }
+
+            #[inline(always)]
+            fn constraint<L: Lanes<T>>(
+                lanes: L,
+                e: &[F<L, T>; 9],
+                block: &Self::Block,
+                k: usize,
+            ) -> (F<L, T>, F<L, T>) {
+                let mut numbers = [e[0]; 2 * $dimension];
+                for (number, column) in numbers.iter_mut().zip(&block.0) {
+                    *number = lanes.load(&column[k..]);
+                }
+                $constraint::<T, L>(e, numbers)
+            }
+        }
     };
 }
 
-matches!(ImageMatches, 2, "Appends a match of two points.");
-matches!(BearingMatches, 3, "Appends a match of two unit bearings.");
+matches!(ImageMatches, 2, on_plane, "Appends a match of two points.");
+matches!(BearingMatches, 3, on_sphere, "Appends a match of two unit bearings.");
+
+/// The columns of [`BLOCK`] matches, aligned to the lines of the cache.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub struct Block<T, const N: usize>([[T; BLOCK]; N]);
 
 /// Columns of the same length in blocks, filled up with NaN.
 #[derive(Clone, Debug)]
 struct Columns<T, const N: usize> {
-    columns: [Vec<[T; BLOCK]>; N],
+    blocks: Vec<Block<T, N>>,
     len: usize,
 }
 
 impl<T, const N: usize> Default for Columns<T, N> {
     fn default() -> Self {
-        Self { columns: [const { Vec::new() }; N], len: 0 }
+        Self { blocks: Vec::new(), len: 0 }
     }
 }
 
 impl<T: Real, const N: usize> Columns<T, N> {
     fn clear(&mut self) {
-        self.columns.iter_mut().for_each(Vec::clear);
+        self.blocks.clear();
         self.len = 0;
     }
 
     fn push(&mut self, row: impl Iterator<Item = T>) {
-        for (column, x) in self.columns.iter_mut().zip(row) {
-            if self.len.is_multiple_of(BLOCK) {
-                column.push([T::NAN; BLOCK]);
-            }
-            column[self.len / BLOCK][self.len % BLOCK] = x;
+        if self.len.is_multiple_of(BLOCK) {
+            self.blocks.push(Block([[T::NAN; BLOCK]; N]));
+        }
+        for (column, x) in self.blocks[self.len / BLOCK].0.iter_mut().zip(row) {
+            column[self.len % BLOCK] = x;
         }
         self.len += 1;
     }
-
-    #[inline(always)]
-    fn block(&self, index: usize) -> [&[T; BLOCK]; N] {
-        self.columns.each_ref().map(|column| &column[index])
-    }
 }
 
-/// The numbers of a block from `k` on, as many as there are lanes.
+/// Of points `(x, y)` and `(u, v)`.
 #[inline(always)]
-fn load<T: Real, L: Lanes<T>, const N: usize>(lanes: L, block: [&[T; BLOCK]; N], k: usize) -> [F<L, T>; N] {
-    let mut out = [lanes.splat(T::NAN); N];
-    for i in 0..N {
-        out[i] = lanes.load(&block[i][k..]);
-    }
-    out
+fn on_plane<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, u, v]: [F<L, T>; 4]) -> (F<L, T>, F<L, T>) {
+    let line2 = [
+        e[0].mul_add(x, e[1].mul_add(y, e[2])),
+        e[3].mul_add(x, e[4].mul_add(y, e[5])),
+        e[6].mul_add(x, e[7].mul_add(y, e[8])),
+    ];
+    let line1 = [e[0].mul_add(u, e[3].mul_add(v, e[6])), e[1].mul_add(u, e[4].mul_add(v, e[7]))];
+    let r = u.mul_add(line2[0], v.mul_add(line2[1], line2[2]));
+    let gradient1 = line1[0].mul_add(line1[0], line1[1] * line1[1]);
+    let gradient2 = line2[0].mul_add(line2[0], line2[1] * line2[1]);
+    (r * r, gradient1 + gradient2)
 }
 
-impl<T: Real> sealed::Columns<T> for ImageMatches<T> {
-    type Block<'a> = [&'a [T; BLOCK]; 4];
-
-    #[inline(always)]
-    fn block(&self, index: usize) -> [&[T; BLOCK]; 4] {
-        self.columns.block(index)
-    }
-
-    #[inline(always)]
-    fn constraint<L: Lanes<T>>(
-        lanes: L,
-        e: &[F<L, T>; 9],
-        block: [&[T; BLOCK]; 4],
-        k: usize,
-    ) -> (F<L, T>, F<L, T>) {
-        let [x, y, u, v] = load(lanes, block, k);
-        let line2 = [
-            e[0].mul_add(x, e[1].mul_add(y, e[2])),
-            e[3].mul_add(x, e[4].mul_add(y, e[5])),
-            e[6].mul_add(x, e[7].mul_add(y, e[8])),
-        ];
-        let line1 = [e[0].mul_add(u, e[3].mul_add(v, e[6])), e[1].mul_add(u, e[4].mul_add(v, e[7]))];
-        let r = u.mul_add(line2[0], v.mul_add(line2[1], line2[2]));
-        let gradient1 = line1[0].mul_add(line1[0], line1[1] * line1[1]);
-        let gradient2 = line2[0].mul_add(line2[0], line2[1] * line2[1]);
-        (r * r, gradient1 + gradient2)
-    }
-}
-
-impl<T: Real> sealed::Columns<T> for BearingMatches<T> {
-    type Block<'a> = [&'a [T; BLOCK]; 6];
-
-    #[inline(always)]
-    fn block(&self, index: usize) -> [&[T; BLOCK]; 6] {
-        self.columns.block(index)
-    }
-
-    #[inline(always)]
-    fn constraint<L: Lanes<T>>(
-        lanes: L,
-        e: &[F<L, T>; 9],
-        block: [&[T; BLOCK]; 6],
-        k: usize,
-    ) -> (F<L, T>, F<L, T>) {
-        let [x, y, z, u, v, w] = load(lanes, block, k);
-        let plane2 = [
-            e[0].mul_add(x, e[1].mul_add(y, e[2] * z)),
-            e[3].mul_add(x, e[4].mul_add(y, e[5] * z)),
-            e[6].mul_add(x, e[7].mul_add(y, e[8] * z)),
-        ];
-        let plane1 = [
-            e[0].mul_add(u, e[3].mul_add(v, e[6] * w)),
-            e[1].mul_add(u, e[4].mul_add(v, e[7] * w)),
-            e[2].mul_add(u, e[5].mul_add(v, e[8] * w)),
-        ];
-        let r = u.mul_add(plane2[0], v.mul_add(plane2[1], w * plane2[2]));
-        let square = r * r;
-        let gradient1 = plane1[0].mul_add(plane1[0], plane1[1].mul_add(plane1[1], plane1[2] * plane1[2]));
-        let gradient2 = plane2[0].mul_add(plane2[0], plane2[1].mul_add(plane2[1], plane2[2] * plane2[2]));
-        (square, gradient1 + gradient2 - (square + square))
-    }
+/// Of bearings `(x, y, z)` and `(u, v, w)`.
+#[inline(always)]
+fn on_sphere<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, z, u, v, w]: [F<L, T>; 6]) -> (F<L, T>, F<L, T>) {
+    let plane2 = [
+        e[0].mul_add(x, e[1].mul_add(y, e[2] * z)),
+        e[3].mul_add(x, e[4].mul_add(y, e[5] * z)),
+        e[6].mul_add(x, e[7].mul_add(y, e[8] * z)),
+    ];
+    let plane1 = [
+        e[0].mul_add(u, e[3].mul_add(v, e[6] * w)),
+        e[1].mul_add(u, e[4].mul_add(v, e[7] * w)),
+        e[2].mul_add(u, e[5].mul_add(v, e[8] * w)),
+    ];
+    let r = u.mul_add(plane2[0], v.mul_add(plane2[1], w * plane2[2]));
+    let square = r * r;
+    let gradient1 = plane1[0].mul_add(plane1[0], plane1[1].mul_add(plane1[1], plane1[2] * plane1[2]));
+    let gradient2 = plane2[0].mul_add(plane2[0], plane2[1].mul_add(plane2[1], plane2[2] * plane2[2]));
+    (square, gradient1 + gradient2 - (square + square))
 }

@@ -41,10 +41,9 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
         let square = self.threshold * self.threshold;
         let limit = lanes.splat(T::from_f64(square));
         let e = splat::<T, L>(lanes, &self.e);
-        let all = self.matches.len();
+        let (all, inverse) = (self.matches.len(), 1.0 / square);
         let mut score = Score { sum: 0.0, visited: 0 };
-        while score.visited < all {
-            let block = self.matches.block(score.visited / BLOCK);
+        for block in self.matches.blocks() {
             let mut sum = zero;
             for k in 0..BLOCK / L::COUNT {
                 let (error, gradient) = C::constraint(lanes, &e, block, k * L::COUNT);
@@ -52,7 +51,7 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
                 // False for the NaN that fill the last block.
                 sum = sum + count(limit, error).select(error.less(limit), zero);
             }
-            score.sum += total::<T, L>(sum) / square;
+            score.sum += sum.sum().into() * inverse;
             score.visited = all.min(score.visited + BLOCK);
             if self.stop.is_reached(score.sum, score.visited, all) {
                 break;
@@ -92,8 +91,7 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Inliers<'_, T, C> {
         let square = lanes.splat(T::from_f64(self.threshold * self.threshold));
         let e = splat::<T, L>(lanes, &self.e);
         let mut count = 0;
-        for (block, word) in self.mask.iter_mut().enumerate() {
-            let block = self.matches.block(block);
+        for (block, word) in self.matches.blocks().iter().zip(self.mask) {
             for k in (0..BLOCK).step_by(L::COUNT) {
                 let (error, gradient) = C::constraint(lanes, &e, block, k);
                 let is_inlier = error.less(gradient * square);
@@ -116,16 +114,4 @@ fn splat<T: Real, L: Lanes<T>>(lanes: L, e: &[T; 9]) -> [F<L, T>; 9] {
         out[i] = lanes.splat(e[i]);
     }
     out
-}
-
-/// The sum over the lanes.
-#[inline(always)]
-fn total<T: Real, L: Lanes<T>>(sum: F<L, T>) -> f64 {
-    let mut parts = [T::from_f64(0.0); MAX_LANES];
-    sum.store(&mut parts);
-    let mut total = 0.0;
-    for part in &parts[..L::COUNT] {
-        total += (*part).into();
-    }
-    total
 }
