@@ -282,7 +282,6 @@ impl<const N: usize> Chain<N> {
     }
 
     /// A point beyond all roots on the side of `direction` (±1) from `end`; `None` where there are none.
-    #[expect(clippy::float_cmp, reason = "changes are counts")]
     fn bound(&self, direction: f64, end: End) -> Option<End> {
         // At ±∞ the leading terms decide: x, and the slopes of the recurrence.
         let mut at_infinity = u32::from((self.last_linear[1] * direction < 0.0) != (self.last < 0.0));
