@@ -230,6 +230,7 @@ def test_third_view() -> None:
         assert rotation_error(found.estimate_31.R, other.R) < 1
         assert found.disagreement is not None
         assert found.next_best is not None
+        assert found.ratio is not None
         assert found.disagreement <= found.next_best
         ratio = np.linalg.norm(other.t) / np.linalg.norm(scene.t)
         np.testing.assert_allclose(found.ratio, ratio, rtol=0.1)
