@@ -11,6 +11,6 @@ pub(crate) mod monomials;
 pub(crate) mod null_space;
 pub(crate) mod number;
 pub(crate) mod polynomial;
-pub(crate) mod singular;
 pub(crate) mod symmetric;
+pub(crate) mod tridiagonal;
 pub(crate) mod two;

@@ -210,7 +210,7 @@ impl Forms {
 }
 
 /// The ten divided cubics over [`CUBIC`].
-fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
+pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let forms = Forms::new(basis, p);
     let Forms { t, s, e, .. } = &forms;
     let lambda = forms.lambda(p);

@@ -1,12 +1,12 @@
 //! All constraints of any number of matches in one matrix: what the search for local minima works with, at a cost that does
 //! not depend on their number.
 
-use nalgebra::{Matrix3, Matrix5, SMatrix, UnitQuaternion, Vector3, Vector5};
+use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 
 use super::aligned::{Alignment, Coordinates, GRAM_DEPENDENT};
-use super::least_squares::principal_axes;
 use super::motion::{Motion, damped_step};
 use crate::algebra::symmetric::smallest_eigenvector_3;
+use crate::algebra::tridiagonal::eigen;
 use crate::algebra::two::{self, Two, side_by_side};
 use crate::alignment::rotation_of_outer_sum;
 use crate::degeneracy::diagnose;
@@ -92,7 +92,7 @@ impl Gram {
         &mut self,
         matches: &[Correspondence],
     ) -> Result<[Coordinates; 9], Degeneracy> {
-        let (squares, basis) = principal_axes(&SMatrix::from_fn(|i, j| self.sum[i][j]));
+        let (squares, basis) = eigen(self.sum);
         if !self.by_rows && squares[4] < DOUBTFUL * squares[0] {
             *self = Self::new(&Alignment::new(matches), matches);
             return self.principal_basis(matches);
@@ -167,31 +167,35 @@ impl Gram {
         // With r = e / √g: dr = (de − e dg / (2 g)) / √g.
         let (g, half) = self.gradient(&frame, &turned);
         let [h0, h1, _, h3, h4] = half.map(|derivative| derivative / g);
-        // The derivatives and the value side by side: rows of six vectorise.
-        let columns: [[f64; 6]; 9] = std::array::from_fn(|k| {
+        // The derivatives and the value side by side.
+        let columns: [[Two; 3]; 9] = std::array::from_fn(|k| {
             let v = value[k];
-            [d0[k] - h0 * v, d1[k] - h1 * v, d2[k], d3[k] - h3 * v, d4[k] - h4 * v, v]
+            [[d0[k] - h0 * v, d1[k] - h1 * v], [d2[k], d3[k] - h3 * v], [d4[k] - h4 * v, v]].map(Two::new)
         });
-        let mut products = [[0.0; 6]; 6];
+        let mut products = [[Two::ZERO; 3]; 6];
         for (row, column) in self.sum.iter().zip(&columns) {
-            let mut weighted = [0.0; 6];
+            let mut weighted = [Two::ZERO; 3];
             for (factor, other) in row.iter().zip(&columns) {
-                for j in 0..6 {
-                    weighted[j] += factor * other[j];
+                for j in 0..3 {
+                    weighted[j] += other[j] * *factor;
                 }
             }
-            for i in 0..6 {
-                for j in 0..6 {
-                    products[i][j] += column[i] * weighted[j];
+            let column = column.map(Two::to_array);
+            for (i, factor) in column.as_flattened().iter().enumerate() {
+                // The upper triangle.
+                for j in i / 2..3 {
+                    products[i][j] += weighted[j] * *factor;
                 }
             }
         }
+        let products = products.map(|row| row.map(Two::to_array));
+        let product = |i: usize, j: usize| products[i.min(j)].as_flattened()[i.max(j)];
         Equations {
             frame,
             g,
-            cost: products[5][5] / g,
-            hessian: Matrix5::from_fn(|i, j| products[i][j]),
-            gradient: Vector5::from_fn(|i, _| products[i][5]),
+            cost: product(5, 5) / g,
+            hessian: Matrix5::from_fn(product),
+            gradient: Vector5::from_fn(|i, _| product(i, 5)),
         }
     }
 

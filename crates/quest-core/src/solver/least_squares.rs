@@ -1,9 +1,10 @@
 //! The least-squares null space of any number of rows of nine.
 
-use nalgebra::{SMatrix, SymmetricEigen, Vector3};
+use nalgebra::Vector3;
 
 use super::aligned::{DEPENDENT, GRAM_DEPENDENT};
 use crate::algebra::null_space::null_space;
+use crate::algebra::tridiagonal::eigen;
 
 /// An orthonormal basis of the nine coordinates, those that the rows constrain most first, and the sums of squares that the
 /// rows leave of each.
@@ -19,16 +20,7 @@ pub(crate) fn principal_basis(rows: impl Iterator<Item = [f64; 9]>) -> ([f64; 9]
             }
         }
     }
-    principal_axes(&SMatrix::from_fn(|i, j| lower[i.max(j)][i.min(j)]))
-}
-
-/// The eigenvalues of a Gram matrix, the largest first, and their vectors.
-pub(crate) fn principal_axes(gram: &SMatrix<f64, 9, 9>) -> ([f64; 9], [[f64; 9]; 9]) {
-    let eigen = SymmetricEigen::new(*gram);
-    let mut order = [0, 1, 2, 3, 4, 5, 6, 7, 8];
-    order.sort_unstable_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-    let basis = order.map(|k| std::array::from_fn(|i| eigen.eigenvectors[(i, k)]));
-    (order.map(|k| eigen.eigenvalues[k]), basis)
+    eigen(std::array::from_fn(|i| std::array::from_fn(|j| lower[i.max(j)][i.min(j)])))
 }
 
 /// The unit vector that at least eight rows leave the smallest sum of squares; `None` where they leave more than one.

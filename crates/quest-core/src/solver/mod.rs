@@ -13,7 +13,6 @@ pub mod kneip;
 pub mod kukelova;
 mod least_squares;
 pub mod li_hartley;
-mod minor_values;
 mod moments;
 pub(crate) mod motion;
 pub mod nister;

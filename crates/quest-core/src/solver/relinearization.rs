@@ -15,32 +15,40 @@
 //! 4. `s` gives `x`, and ratios of its entries the quaternion. Newton's iteration, translation and depths as for every solver.
 //!
 //! **What is different here.** The paper's `x_p` is one more `v_i`, and (40) the form `s_0 = (q·q)²` that the others are
-//! divided by: with that, all is homogeneous. The minors of [`quaternion`](crate::quaternion) that the paper does not have
-//! leave no more directions `v_i` than there are solutions, so that `W_0` is square. Then:
-//! - *Five matches*, 20 directions: `D̄` is 465 × 210, and its null space comes from an elimination of 15 × 35 (`moments.rs`).
-//! - *More*: the six combinations of all constraints that the matches determine best have 35 minors (`minor_values.rs`). The paper
-//!   has two solutions here. With noise the minors leave no direction quite open, and the four shortest hold the solutions
-//!   better than the two shortest: `D̄` has ten columns, the squares of which follow from the four directions without its 465
-//!   rows; its four shortest directions in place of null vectors make two
-//!   solutions and two that mean nothing, and all are refined over all matches. Points of a plane leave more directions than
-//!   that: where a homography explains the matches its two motions are refined as well. Where nothing fits, the motion on
-//!   which most matches agree is added (`consensus.rs`).
+//! divided by: with that, all is homogeneous.
+//! - *Five matches*. The minors of [`quaternion`](crate::quaternion) that the paper does not have leave no more directions `v_i`
+//!   than there are solutions, 20, so that `W_0` is square. `D̄` is 465 × 210, and its null space comes from an elimination
+//!   of 15 × 35 (`moments.rs`).
+//! - *More*. Two solutions are left, a quaternion `q` and its twisted partner `q'`, and the first unknowns are
+//!   products of these two instead of four factors `q`: `X = q q'ᵀ + q' qᵀ`, of trace zero, has nine, and a match is one linear
+//!   equation `q'ᵀ M_i q = 0` in them. They are the entries of the essential matrix in another basis, whose constraints are
+//!   kept from vanishing with the parallax (`aligned.rs`). Six matches leave three directions, `X = Σ s_i V_i`; of more the three
+//!   that they determine least. That products commute is that `X` has rank two (Fløystad, Kileel, Ottaviani, *The Chow form of
+//!   the essential variety in computer vision*, Journal of Symbolic Computation 86, 2018): ten cubics (`cubics.rs`), linear
+//!   in the ten products `y = (s_i s_j s_k)`. So `D̄` is 10 × 10, and has one null vector where the paper's has two, as `X`
+//!   is both solutions. With noise it has none, and what it comes nearest to is often not the nearest to the truth. So only the
+//!   four products of `s_1` and `s_2` alone are eliminated, in the least-squares sense of all ten cubics; the other
+//!   six are `W_0`, with `s_3` for `s_0`, and the true solution one of six, complex ones included.
 //!
-//! **Degenerate**: fewer than five independent constraints; an exact pure rotation. With little parallax all solutions run
-//! together and the eigenvalues lose their digits: at a parallax of 1e-7 next to none of the true poses is lost, at 1e-8 one
-//! in twenty.
+//! All are refined over all matches. Noise hides the solution of points near a plane: where a homography explains the
+//! matches its two motions are refined as well. Where nothing fits, the motion on which most matches agree is added
+//! (`consensus.rs`).
+//!
+//! **Degenerate**: fewer than five independent constraints; an exact pure rotation. Of five matches with little parallax all
+//! solutions run together and the eigenvalues lose their digits: at a parallax of 1e-7 next to none of the true poses is
+//! lost, at 1e-8 one in twenty.
 //!
 //! **Solutions**: twenty rotations for five matches, counting complex ones, a pair of which is one candidate; for more two, and
 //! other local minima that were found beside them; and the rotation-only candidate.
 
-use nalgebra::{ComplexField, Matrix4, Quaternion, SMatrix, UnitQuaternion};
+use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 
 use super::aligned::Coordinates;
 use super::consensus::AGREEMENT;
-use super::essential::real_part;
+use super::cubics::{CUBIC, Cubic, combine, ten_cubics};
+use super::essential::{decompose, real_part, twisted};
 use super::gram::Gram;
 use super::homography::motions_of_plane;
-use super::minor_values::{minors_at_points, monomials};
 use super::moments::Pencil;
 use super::motion::Motion;
 use super::shortlist::Shortlist;
@@ -48,10 +56,8 @@ use super::twenty::from_five;
 use super::{Kinds, PoseSolver, refining};
 use crate::algebra::eigenvalues::Hessenberg;
 use crate::algebra::elimination;
-use crate::algebra::monomials::{homogeneous, position};
-use crate::algebra::singular::shortest_directions;
-use crate::quaternion::bilinear;
-use crate::quaternion::monomials::{MONOMIALS, Quartic};
+use crate::algebra::monomials::position;
+use crate::algebra::number::Number;
 use crate::{CandidateKind, Candidates, Correspondence};
 
 /// The relinearisation of sections 4.2 and 7.2 of the paper; its steps stand at the head of the module.
@@ -73,10 +79,12 @@ impl PoseSolver for Relinearization {
 }
 
 /// The solutions of the six constraints that stand for all matches, and the motions of a plane.
-fn starts(gram: &Gram, basis: &[Coordinates; 9], matches: &[Correspondence]) -> Shortlist {
+fn starts(gram: &Gram, [.., v1, v2, v3]: &[Coordinates; 9], matches: &[Correspondence]) -> Shortlist {
     let mut starts = Shortlist::new();
-    for (kind, q_21) in solutions(rows(gram, basis)).into_iter().flatten() {
-        starts.push(kind, Motion { q_21, direction: gram.direction(&q_21) });
+    // The cubics have four variables, the first of them for five matches alone.
+    let basis = [[0.0; 9], *v1, *v2, *v3];
+    if let Some(factors) = eliminated(&ten_cubics(&basis, gram.alignment.parallax)) {
+        add_solutions(&factors, gram, &basis, &mut starts);
     }
     for motion in motions_of_plane(matches, AGREEMENT).into_iter().flatten() {
         starts.push(CandidateKind::Exact, motion);
@@ -84,188 +92,154 @@ fn starts(gram: &Gram, basis: &[Coordinates; 9], matches: &[Correspondence]) -> 
     starts
 }
 
-/// The minors of the six constraints, at the points.
-fn rows(gram: &Gram, [n1, n2, n3, n4, n5, n6, ..]: &[Coordinates; 9]) -> [[f64; 35]; 35] {
-    minors_at_points(&[n1, n2, n3, n4, n5, n6].map(|row| bilinear(&gram.alignment.constraint(row))))
-}
-
-/// `FACTORED[l][m]`: the place in `x` of `q_l` times the cubic monomial `m`.
-const FACTORED: [[usize; 20]; 4] = {
-    const CUBIC: [[u8; 4]; 20] = homogeneous(3);
-    let mut table = [[0; 20]; 4];
-    let mut l = 0;
-    while l < 4 {
-        let mut m = 0;
-        while m < 20 {
-            let mut product = CUBIC[m];
-            product[l] += 1;
-            table[l][m] = position(&MONOMIALS, product);
-            m += 1;
-        }
-        l += 1;
-    }
-    table
-};
-
-/// `(q·q)²` as a form on `x`.
-const NORM: Quartic = {
-    let mut form = [0.0; 35];
+/// Where the ten products of `s_1, s_2, s_3` stand in a cubic: first the four without `s_3`, by falling powers of `s_1`, then
+/// `s_3` times `s_1², s_1 s_2, s_2², s_1 s_3, s_2 s_3, s_3²`.
+const PRODUCTS: [usize; 10] = {
+    const EXPONENTS: [[u8; 4]; 10] = [
+        [0, 3, 0, 0],
+        [0, 2, 1, 0],
+        [0, 1, 2, 0],
+        [0, 0, 3, 0],
+        [0, 2, 0, 1],
+        [0, 1, 1, 1],
+        [0, 0, 2, 1],
+        [0, 1, 0, 2],
+        [0, 0, 1, 2],
+        [0, 0, 0, 3],
+    ];
+    let mut places = [0; 10];
     let mut k = 0;
-    while k < 35 {
-        let [a, b, c, d] = MONOMIALS[k];
-        if a % 2 == 0 && b % 2 == 0 && c % 2 == 0 && d % 2 == 0 {
-            form[k] = if a == 4 || b == 4 || c == 4 || d == 4 { 1.0 } else { 2.0 };
-        }
+    while k < 10 {
+        places[k] = position(&CUBIC, EXPONENTS[k]);
         k += 1;
     }
-    form
+    places
 };
 
-/// A generic `s_l`.
-const FORM: [f64; 4] = [0.53, -0.86, 0.71, 0.37];
-
-/// `PAIR[i][j]`: the place of `s_i s_j` in `y`.
-const PAIR: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]];
-
-/// The rotations at which all minors, rows of values at the points, vanish, and as many others where they do not.
-fn solutions(mut rows: [[f64; 35]; 35]) -> [Option<(CandidateKind, UnitQuaternion<f64>)>; 4] {
-    let v = shortest_directions::<35, 35, 4>(&mut rows).map(|weights| monomials(&weights));
-    let w: [[f64; 10]; 4] = shortest_directions(&mut relinearized(&v));
-    let norm = v.map(|v| v.iter().zip(NORM).map(|(x, c)| x * c).sum::<f64>());
-    // Σ_j f_j s_j s_i by the null vectors.
-    let row = |f: &[f64; 4], i: usize, k: usize| (0..4).map(|j| f[j] * w[k][PAIR[i][j]]).sum::<f64>();
-    let w0: [[f64; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|k| row(&norm, i, k)));
-    let mut pencil: [[f64; 8]; 4] =
-        std::array::from_fn(|i| std::array::from_fn(|k| if k < 4 { w0[i][k] } else { row(&FORM, i, k - 4) }));
-    if elimination::reduce(&mut pencil, 0) == 0.0 {
-        return [None; 4];
+/// The four products without `s_3` by the six with it, in the least-squares sense of the cubics; `None` where they do not
+/// determine these.
+fn eliminated(cubics: &[Cubic; 10]) -> Option<[[f64; 6]; 4]> {
+    let mut normal = [[0.0; 10]; 4];
+    for cubic in cubics {
+        let row = PRODUCTS.map(|place| cubic[place]);
+        for (sums, factor) in normal.iter_mut().zip(row) {
+            for (sum, x) in sums.iter_mut().zip(row) {
+                *sum += factor * x;
+            }
+        }
     }
-    let action = Hessenberg::<4>::new(pencil.map(|row| std::array::from_fn(|k| row[4 + k])));
-    let Some((action, values)) = action.and_then(|a| a.eigenvalues().map(|values| (a, values))) else {
-        return [None; 4];
-    };
-    values.map(|value| {
+    let pivot = elimination::reduce(&mut normal, 0);
+    (pivot > 0.0).then(|| normal.map(|row| std::array::from_fn(|k| -row[4 + k])))
+}
+
+/// `W_l W_0⁻¹`: the six products with `s_3`, multiplied by `s_l / s_3` for a generic `s_l` of `s_1` and `s_2`.
+fn action([a, b, c, d]: &[[f64; 6]; 4]) -> [[f64; 6]; 6] {
+    const FORM: [f64; 2] = [0.6, 0.8];
+    let product = |k: usize| std::array::from_fn(|j| if j == k { 1.0 } else { 0.0 });
+    let by_first = [*a, *b, *c, product(0), product(1), product(3)];
+    let by_second = [*b, *c, *d, product(1), product(2), product(4)];
+    std::array::from_fn(|i| std::array::from_fn(|j| FORM[0] * by_first[i][j] + FORM[1] * by_second[i][j]))
+}
+
+/// The motions of the eigenvectors: of a real one the two that are twisted partners, of a complex pair the real parts of both
+/// quaternions.
+fn add_solutions(factors: &[[f64; 6]; 4], gram: &Gram, basis: &[Coordinates; 4], starts: &mut Shortlist) {
+    let Some(action) = Hessenberg::new(action(factors)) else { return };
+    let Some(values) = action.eigenvalues() else { return };
+    let q0_21 = gram.alignment.q0_21;
+    for value in values {
         if value.im == 0.0 {
-            rotation(CandidateKind::Exact, quaternion(&x(&v, &w0, &action.eigenvector(value.re)?)))
+            let y = action.eigenvector(value.re);
+            let Some((q, t)) = y.and_then(|y| quaternion_and_direction(&y, gram, basis)) else { continue };
+            starts.push_pair(CandidateKind::Exact, Motion { q_21: rotation(q) * q0_21, direction: t.into() });
         } else if value.im > 0.0 {
-            let q = quaternion(&x(&v, &w0, &action.eigenvector(value)?));
-            rotation(CandidateKind::FromComplex, real_part(q))
-        } else {
-            None
-        }
-    })
-}
-
-/// `x = Σ s_i v_i` with `s = W_0 r`.
-fn x<T: ComplexField<RealField = f64> + Copy>(v: &[Quartic; 4], w0: &[[f64; 4]; 4], r: &[T; 4]) -> [T; 35] {
-    let mut x = [T::zero(); 35];
-    for (v, row) in v.iter().zip(w0) {
-        let mut s = T::zero();
-        for (r, w) in r.iter().zip(row) {
-            s += r.scale(*w);
-        }
-        for (x, v) in x.iter_mut().zip(v) {
-            *x += s.scale(*v);
-        }
-    }
-    x
-}
-
-fn rotation(kind: CandidateKind, [w, x, y, z]: [f64; 4]) -> Option<(CandidateKind, UnitQuaternion<f64>)> {
-    let q = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-    q.coords.iter().all(ComplexField::is_finite).then_some((kind, q))
-}
-
-/// `2 D̄ᵀ D̄` for four directions.
-///
-/// That monomials commute, `(q_l f)(q_k g) = (q_k f)(q_l g)` for cubic monomials `f` and `g`, are the 2 × 2 minors of the matrix
-/// `x(q_l f)`, 4 × 20. With `A_i` that matrix of `v_i`, the products of two columns of `D̄`, summed over all minors, are
-/// `(A_i · A_m)(A_j · A_n) − tr(A_i A_mᵀ A_j A_nᵀ)` and the same with `m` and `n` exchanged.
-fn relinearized(v: &[Quartic; 4]) -> [[f64; 10]; 10] {
-    let a = v.map(|v| SMatrix::<f64, 4, 20>::from_fn(|l, f| v[FACTORED[l][f]]));
-    let g: [[Matrix4<f64>; 4]; 4] = a.map(|a_i| a.map(|a_m| a_i * a_m.transpose()));
-    let trace = g.map(|row| row.map(|g| g.trace()));
-    // g[n][j] is the transpose of g[j][n]: the trace of a product is a sum over entries.
-    let product = |[i, m]: [usize; 2], [j, n]: [usize; 2]| trace[i][m] * trace[j][n] - g[i][m].dot(&g[n][j]);
-    let mut squares = [[0.0; 10]; 10];
-    for (i, row) in PAIR.iter().enumerate() {
-        for (j, &left) in row.iter().enumerate() {
-            for (m, row) in PAIR.iter().enumerate() {
-                for (n, &right) in row.iter().enumerate() {
-                    squares[left][right] += product([i, m], [j, n]);
-                }
+            let y: Option<[Complex<f64>; 6]> = action.eigenvector(value);
+            let Some((q, t)) = y.and_then(|y| quaternion_and_direction(&y, gram, basis)) else { continue };
+            for q in [q, twisted(&q, &t)] {
+                let q_21 = rotation(real_part(q)) * q0_21;
+                starts.push(CandidateKind::FromComplex, Motion { q_21, direction: gram.direction(&q_21) });
             }
         }
     }
-    squares
 }
 
-/// The quaternion, of any scale, from the values of the quartic monomials: the row of the largest fourth power.
-fn quaternion<T: ComplexField<RealField = f64> + Copy>(x: &[T; 35]) -> [T; 4] {
-    const RATIOS: [[usize; 4]; 4] = {
-        let mut rows = [[0; 4]; 4];
-        let mut k = 0;
-        while k < 4 {
-            let mut j = 0;
-            while j < 4 {
-                let mut monomial = [0; 4];
-                monomial[k] = 3;
-                monomial[j] += 1;
-                rows[k][j] = position(&MONOMIALS, monomial);
-                j += 1;
-            }
-            k += 1;
-        }
-        rows
-    };
-    let size = |k: usize| x[RATIOS[k][k]].norm1();
-    let k = (1..4).fold(0, |best, k| if size(k) > size(best) { k } else { best });
-    RATIOS[k].map(|place| x[place])
+/// One of the two quaternions, after the alignment, and the translation, by the products with `s_3`.
+fn quaternion_and_direction<T: Number + ComplexField>(
+    [.., s1, s2, s3]: &[T; 6],
+    gram: &Gram,
+    basis: &[Coordinates; 4],
+) -> Option<([T; 4], [T; 3])> {
+    decompose(&gram.alignment.essential(&combine(basis, &[<T as Number>::real(0.0), *s1, *s2, *s3])))
+}
+
+fn rotation([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Scene, SceneOptions};
-    use nalgebra::SVector;
+    use crate::quaternion::bilinear;
+    use crate::simulate::{Layout, Motion as SceneMotion, Scene, SceneOptions};
+    use nalgebra::{Matrix4, Vector3, Vector4};
 
     const SEED: u64 = 110;
 
-    fn veronese(q: &UnitQuaternion<f64>) -> Quartic {
-        let q = [q.w, q.i, q.j, q.k];
-        MONOMIALS.map(|e| (0..4).map(|k| q[k].powi(e[k].into())).product())
+    #[test]
+    fn products_with_the_twisted_partner_are_the_essential_matrix() {
+        let motion = Motion {
+            q_21: UnitQuaternion::new(Vector3::new(0.3, -0.2, 0.9)),
+            direction: Vector3::new(0.6, 0.0, -0.8),
+        };
+        let wxyz = |m: &Motion| Vector4::new(m.q_21.w, m.q_21.i, m.q_21.j, m.q_21.k);
+        let (q, twin) = (wxyz(&motion), wxyz(&motion.twisted()));
+        let x: Matrix4<f64> = q * twin.transpose() + twin * q.transpose();
+        assert!(x.trace().abs() < 1e-15 && x.determinant().abs() < 1e-15);
+        for k in 0..9 {
+            let (a, b) = (Vector3::ith(k % 3, 1.0), Vector3::ith(k / 3, 1.0));
+            let expected = b.dot(&(motion.essential() * a));
+            assert!((bilinear(&(b * a.transpose())).dot(&x) - 2.0 * expected).abs() < 1e-14);
+        }
     }
 
     #[test]
-    fn monomials_commute() {
-        let q = UnitQuaternion::new_normalize(Quaternion::new(0.4, -0.7, 0.3, 0.9));
-        let x = veronese(&q);
-        assert!(relinearized(&[x; 4]).as_flattened().iter().all(|product| product.abs() < 1e-14));
-        let found = rotation(CandidateKind::Exact, quaternion(&x)).unwrap().1;
-        assert!(found.angle_to(&q) < 1e-7);
+    fn products_of_coefficients_are_multiplied() {
+        // Cubics that vanish at a point and nowhere else.
+        let s = [0.3, -0.8, 0.5];
+        let cubic: Cubic = CUBIC
+            .map(|e| if e[0] > 0 { 0.0 } else { (0..3).map(|k| f64::powi(s[k], e[k + 1].into())).product() });
+        let square: f64 = cubic.iter().map(|x| x * x).sum();
+        let cubics: [Cubic; 10] = std::array::from_fn(|i| {
+            let row: Cubic = std::array::from_fn(|j| ((3 * i + 7 * j) as f64 * 1.3 + 0.2).sin());
+            let along = row.iter().zip(&cubic).map(|(x, y)| x * y).sum::<f64>() / square;
+            std::array::from_fn(|j| row[j] - along * cubic[j])
+        });
+        let y: [f64; 6] = std::array::from_fn(|k| cubic[PRODUCTS[4 + k]]);
+        let value = (0.6 * s[0] + 0.8 * s[1]) / s[2];
+        for (row, y_i) in action(&eliminated(&cubics).unwrap()).iter().zip(y) {
+            let image: f64 = row.iter().zip(y).map(|(a, y)| a * y).sum();
+            assert!((image - value * y_i).abs() < 1e-12);
+        }
     }
 
     #[test]
-    fn the_true_rotation_and_its_twisted_partner_span_the_directions() {
+    fn the_true_motion_is_among_the_starts() {
+        let general = SceneOptions::default();
+        let kinds = [
+            general,
+            SceneOptions { layout: Layout::Coplanar, ..general },
+            SceneOptions { motion: SceneMotion::Parallax(1e-6), ..general },
+        ];
         for points in [6, 7, 20] {
-            for index in 0..100 {
-                let options = SceneOptions { points, ..SceneOptions::default() };
-                let scene = Scene::generate(&options, SEED, index).unwrap();
-                let mut gram = Gram::aligned(&scene.matches);
-                let basis = gram.principal_basis(&scene.matches).unwrap();
-                let rows = rows(&gram, &basis);
-                let directions = shortest_directions::<35, 35, 2>(&mut rows.clone()).map(|w| monomials(&w));
-                let directions = SMatrix::<f64, 35, 2>::from_fn(|i, j| directions[j][i]);
-                let inverse = directions.pseudo_inverse(0.0).unwrap();
-                let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
-                for q in [truth.q_21, truth.twisted().q_21] {
-                    let x = SVector::from(veronese(&q));
-                    // 1e-15 over the 33rd singular value, which is above 1e-9 of the first.
-                    let outside = x - directions * (inverse * x);
-                    assert!(outside.amax() < 1e-6, "{points} points, scene {index}");
-                    let found = solutions(rows);
-                    let nearest = found.iter().flatten().map(|(_, p)| p.angle_to(&q)).fold(9.0, f64::min);
-                    assert!(nearest < 1e-6, "{points} points, scene {index}: {nearest:e}");
+            for options in kinds {
+                for index in 0..100 {
+                    let scene = Scene::generate(&SceneOptions { points, ..options }, SEED, index).unwrap();
+                    let mut gram = Gram::aligned(&scene.matches);
+                    let basis = gram.principal_basis(&scene.matches).unwrap();
+                    let starts = starts(&gram, &basis, &[]);
+                    let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
+                    let is_true = |m: &Motion| m.is_close(&truth, 1e-5) || m.twisted().is_close(&truth, 1e-5);
+                    assert!(starts.iter().any(|item| is_true(&item.motion)), "{options:?}, scene {index}");
                 }
             }
         }
