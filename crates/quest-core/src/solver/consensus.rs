@@ -9,7 +9,7 @@ use rand::seq::index::sample_array;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use super::motion::Motion;
+use super::motion::{FINE, Motion, Until};
 use super::quest::motions_of_five;
 use super::shortlist::Shortlist;
 use crate::{CandidateKind, Correspondence};
@@ -37,7 +37,7 @@ pub(crate) fn add(shortlist: &mut Shortlist, matches: &[Correspondence]) {
         }
     }
     if let Some((_, mut motion)) = best {
-        motion.minimise_sampson(matches, AGREEMENT, 30);
+        motion.minimise_sampson(matches, AGREEMENT, &Until { steps: 30, ..FINE });
         shortlist.push_pair(CandidateKind::Exact, motion);
     }
 }

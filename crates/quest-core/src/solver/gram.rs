@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Matrix5, UnitQuaternion, Vector3, Vector5};
 
 use super::aligned::{Alignment, Coordinates, GRAM_DEPENDENT};
-use super::motion::{Motion, damped_step};
+use super::motion::{COARSE, Equations, Motion};
 use crate::algebra::symmetric::smallest_eigenvector_3;
 use crate::algebra::tridiagonal::eigen;
 use crate::algebra::two::{self, Two, side_by_side};
@@ -37,14 +37,6 @@ const PARALLAX_OF_MOMENTS: f64 = 1e-2;
 /// Constraints closer to dependent than this by moments of the bearings are summed row by row: the rounding of the moments
 /// divided by the square of [`PARALLAX_OF_MOMENTS`], a hundred times.
 const DOUBTFUL: f64 = 1e-10;
-
-/// Steps of a coarse minimisation.
-const MAX_STEPS: usize = 12;
-
-/// The last step of a coarse minimisation: this short in radians, or as little beside what the noise leaves
-/// undetermined (its square in units of the variance).
-const COARSE: f64 = 1e-3;
-const WITHIN_NOISE: f64 = 1e-2;
 
 impl Gram {
     /// The best alignment of any number of matches and their constraints, in one pass over the matches where there is
@@ -116,29 +108,9 @@ impl Gram {
         (self.count - 5.0).max(1.0)
     }
 
-    /// Levenberg–Marquardt from a motion to near a local minimum of the cost: what the Sampson errors are to decide is
-    /// left to these.
+    /// From a motion to near a local minimum of the cost: what the Sampson errors are to decide is left to these.
     pub(crate) fn minimise(&self, motion: &mut Motion) {
-        let mut damping = 1e-4;
-        let mut current = self.equations(motion);
-        for _ in 0..MAX_STEPS {
-            let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else { break };
-            let fall = -step.dot(&current.gradient) / current.g;
-            let trial = motion.moved(&current.frame, &step.into());
-            let next = self.equations(&trial);
-            if next.cost <= current.cost {
-                let enough = fall * self.beyond_five() < WITHIN_NOISE * current.cost;
-                (*motion, current) = (trial, next);
-                damping *= 0.1;
-                if enough || step.norm() < COARSE {
-                    break;
-                }
-            } else if damping < 1e3 {
-                damping *= 10.0;
-            } else {
-                break;
-            }
-        }
+        motion.descend(|motion| self.equations(motion), self.beyond_five(), &COARSE);
     }
 
     /// The cost of a motion.
@@ -172,6 +144,7 @@ impl Gram {
             let v = value[k];
             [[d0[k] - h0 * v, d1[k] - h1 * v], [d2[k], d3[k] - h3 * v], [d4[k] - h4 * v, v]].map(Two::new)
         });
+        let over_g = 1.0 / g;
         let mut products = [[Two::ZERO; 3]; 6];
         for (row, column) in self.sum.iter().zip(&columns) {
             let mut weighted = [Two::ZERO; 3];
@@ -180,7 +153,7 @@ impl Gram {
                     weighted[j] += other[j] * *factor;
                 }
             }
-            let column = column.map(Two::to_array);
+            let column = column.map(|pair| (pair * over_g).to_array());
             for (i, factor) in column.as_flattened().iter().enumerate() {
                 // The upper triangle.
                 for j in i / 2..3 {
@@ -192,8 +165,7 @@ impl Gram {
         let product = |i: usize, j: usize| products[i.min(j)].as_flattened()[i.max(j)];
         Equations {
             frame,
-            g,
-            cost: product(5, 5) / g,
+            cost: product(5, 5),
             hessian: Matrix5::from_fn(product),
             gradient: Vector5::from_fn(|i, _| product(i, 5)),
         }
@@ -221,16 +193,6 @@ fn dot(x: &Coordinates, y: &Coordinates) -> f64 {
         sum += x[k] * y[k];
     }
     sum
-}
-
-/// The normal equations of a step from a motion.
-struct Equations {
-    frame: EpipolarFrame,
-    /// By which the sums are to be divided: the mean of `|t × b|² + |t × c|²`.
-    g: f64,
-    cost: f64,
-    hessian: Matrix5<f64>,
-    gradient: Vector5<f64>,
 }
 
 /// `[t]× R` for `R = Fᵀ turned`, the translation being the third axis of the frame `F`.

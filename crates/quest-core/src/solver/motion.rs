@@ -18,12 +18,21 @@ use crate::algebra::two::{Two, TwoVectors, side_by_side};
 use crate::epipolar_frame::EpipolarFrame;
 use crate::pose::{RIGHT_ANGLE, sampson_square};
 
-/// A step shorter than this (radians) is rounding.
-const CONVERGED: f64 = 1e-13;
+/// When a descent is at its end: its last step needs no check.
+pub(crate) struct Until {
+    /// A step this short (radians).
+    pub(crate) step: f64,
+    /// A step with a square this small in units of the variance that the noise leaves in its direction.
+    pub(crate) within_noise: f64,
+    /// Steps at most.
+    pub(crate) steps: usize,
+}
 
-/// A last step needs no check where its square, in units of the variance that the noise leaves in its direction, is below
-/// this.
-const WITHIN_NOISE: f64 = 1e-3;
+/// At a local minimum, to rounding or well within what the noise leaves undetermined.
+pub(crate) const FINE: Until = Until { step: 1e-13, within_noise: 1e-3, steps: 15 };
+
+/// Near enough to a local minimum to tell it from others.
+pub(crate) const COARSE: Until = Until { step: 1e-3, within_noise: 1e-2, steps: 12 };
 
 /// A relative pose without the length of its translation.
 #[derive(Clone, Copy, Debug)]
@@ -117,25 +126,30 @@ impl Motion {
 
     /// Levenberg–Marquardt to a local minimum of the summed squares of the Sampson errors. Matches further than `cutoff`
     /// (radians) from the epipolar constraint weigh nothing. Returns the sum before the last step.
-    pub(crate) fn minimise_sampson(
+    pub(crate) fn minimise_sampson(&mut self, matches: &[Correspondence], cutoff: f64, until: &Until) -> f64 {
+        let beyond_five = matches.len().saturating_sub(5).max(1) as f64;
+        self.descend(|motion| motion.sampson_equations(matches, cutoff), beyond_five, until)
+    }
+
+    /// Levenberg–Marquardt to a local minimum of a cost that is a sum of squares. Returns the cost before the last step.
+    pub(crate) fn descend(
         &mut self,
-        matches: &[Correspondence],
-        cutoff: f64,
-        max_steps: usize,
+        equations: impl Fn(&Self) -> Equations,
+        beyond_five: f64,
+        until: &Until,
     ) -> f64 {
-        let beyond = matches.len().saturating_sub(5).max(1) as f64;
         let mut damping = 0.0;
-        let mut current = self.sampson_equations(matches, cutoff);
-        for _ in 0..max_steps {
+        let mut current = equations(self);
+        for _ in 0..until.steps {
             let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else { break };
             let trial = self.moved(&current.frame, &step.into());
             // To first order the cost falls by the step's square in units of the noise times its variance.
             let fall = -step.dot(&current.gradient);
-            if step.norm() < CONVERGED || fall * beyond < WITHIN_NOISE * current.cost {
+            if step.norm() < until.step || fall * beyond_five < until.within_noise * current.cost {
                 *self = trial;
                 break;
             }
-            let next = trial.sampson_equations(matches, cutoff);
+            let next = equations(&trial);
             if next.cost < current.cost {
                 (*self, current) = (trial, next);
                 damping *= 0.1;
@@ -211,12 +225,12 @@ fn is_near(cosine: f64, angle: f64) -> bool {
 /// A match with both rays closer than the square root of this to the baseline says nothing about the motion.
 const AT_EPIPOLE: f64 = 1e-20;
 
-/// The normal equations of a step from a motion.
-struct Equations {
-    frame: EpipolarFrame,
-    cost: f64,
-    hessian: Matrix5<f64>,
-    gradient: Vector5<f64>,
+/// The normal equations of a step from a motion, in the parameters of its frame.
+pub(crate) struct Equations {
+    pub(crate) frame: EpipolarFrame,
+    pub(crate) cost: f64,
+    pub(crate) hessian: Matrix5<f64>,
+    pub(crate) gradient: Vector5<f64>,
 }
 
 /// The squared Sampson errors of two constraints, none of them counted beyond `limit`.

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
-use super::motion::Motion;
+use super::motion::{COARSE, FINE, Motion};
 use super::two_motions::TwoMotions;
 use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
@@ -18,6 +18,9 @@ const SAME: f64 = 1e-6;
 
 /// The same for local minima over many matches, which no two of a different origin reach in the same place.
 const SAME_MINIMUM: f64 = 1e-3;
+
+/// Up to so many matches a step on the Sampson errors themselves costs less than one on their [`Gram`] matrix.
+const FEW: usize = 10;
 
 /// How far behind the best a motion may be and still be kept.
 struct Allowance {
@@ -181,12 +184,16 @@ impl Shortlist {
     pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> (Self, f64) {
         let mut coarse = Self { same: SAME_MINIMUM, ..Self::new() };
         for &Item { kind, mut motion, .. } in self.plausible(gram, &STARTS).iter() {
-            gram.minimise(&mut motion);
+            if matches.len() <= FEW {
+                motion.minimise_sampson(matches, f64::INFINITY, &COARSE);
+            } else {
+                gram.minimise(&mut motion);
+            }
             coarse.push_pair(kind, motion);
         }
         let (mut fine, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
         for &Item { kind, mut motion, .. } in coarse.plausible(gram, &MINIMA).iter() {
-            smallest = motion.minimise_sampson(matches, f64::INFINITY, 15).min(smallest);
+            smallest = motion.minimise_sampson(matches, f64::INFINITY, &FINE).min(smallest);
             fine.push_pair(kind, motion);
         }
         (fine, smallest)
