@@ -26,6 +26,7 @@ pub(crate) mod shortlist;
 pub mod stewenius;
 mod trace_cubics;
 mod twenty;
+mod two_descents;
 mod two_motions;
 
 use std::str::FromStr;

@@ -173,8 +173,6 @@ impl Motion {
             let b = frame.of_view2(&side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2)));
             let c = frame.of_view1(&side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1)));
             let (e, along) = constraint(&b, &c);
-            // r = e / √g with g = 2 − (t·b)² − (t·c)² − 2 e², so that
-            // dr = ((1 + 2 e²/g) de + (e/g) (t·b d(t·b) + t·c d(t·c))) / √g.
             let g = Two::splat(2.0) - b[2] * b[2] - c[2] * c[2] - Two::splat(2.0) * e * e;
             let over_g = Two::splat(1.0) / g;
             let square = e * e * over_g;
@@ -184,15 +182,7 @@ impl Motion {
             if !counts.all() {
                 cost += beyond(e & !counts, b[2], c[2], limit);
             }
-            let (scale, bend) = (Two::splat(1.0) + Two::splat(2.0) * square, e * over_g);
-            let row = [
-                scale * along[0] + bend * (c[2] * c[1]),
-                scale * along[1] - bend * (c[2] * c[0]),
-                scale * along[2],
-                scale * along[3] + bend * (b[2] * b[0] + c[2] * c[0]),
-                scale * along[4] + bend * (b[2] * b[1] + c[2] * c[1]),
-                e,
-            ];
+            let row = sampson_row(&b, &c, e, &along, square, over_g);
             for i in 0..5 {
                 let weighted = over_g * row[i];
                 for j in i..6 {
@@ -223,7 +213,7 @@ fn is_near(cosine: f64, angle: f64) -> bool {
 }
 
 /// A match with both rays closer than the square root of this to the baseline says nothing about the motion.
-const AT_EPIPOLE: f64 = 1e-20;
+pub(crate) const AT_EPIPOLE: f64 = 1e-20;
 
 /// The normal equations of a step from a motion, in the parameters of its frame.
 pub(crate) struct Equations {
@@ -242,7 +232,7 @@ fn beyond(e: Two, tb: Two, tc: Two, limit: f64) -> f64 {
 
 /// The residuals of two matches by their bearings in the epipolar frame, and their derivatives by the five parameters.
 #[inline]
-fn constraint(b: &TwoVectors, c: &TwoVectors) -> (Two, [Two; 5]) {
+pub(crate) fn constraint(b: &TwoVectors, c: &TwoVectors) -> (Two, [Two; 5]) {
     let derivative = [
         -b[0] * c[2],
         -b[1] * c[2],
@@ -251,6 +241,32 @@ fn constraint(b: &TwoVectors, c: &TwoVectors) -> (Two, [Two; 5]) {
         b[2] * c[0] - b[0] * c[2],
     ];
     (b[0] * c[1] - b[1] * c[0], derivative)
+}
+
+/// `√g` times the derivatives of the Sampson errors `r = e / √g` of two constraints, and `e` itself:
+///
+/// ```text
+/// g = 2 − (t·b)² − (t·c)² − 2 e²
+/// dr = ((1 + 2 e²/g) de + (e/g) (t·b d(t·b) + t·c d(t·c))) / √g
+/// ```
+#[inline]
+pub(crate) fn sampson_row(
+    b: &TwoVectors,
+    c: &TwoVectors,
+    e: Two,
+    along: &[Two; 5],
+    square: Two,
+    over_g: Two,
+) -> [Two; 6] {
+    let (scale, bend) = (Two::splat(1.0) + Two::splat(2.0) * square, e * over_g);
+    [
+        scale * along[0] + bend * (c[2] * c[1]),
+        scale * along[1] - bend * (c[2] * c[0]),
+        scale * along[2],
+        scale * along[3] + bend * (b[2] * b[0] + c[2] * c[0]),
+        scale * along[4] + bend * (b[2] * b[1] + c[2] * c[1]),
+        e,
+    ]
 }
 
 /// The step `−(H + damping · diag H)⁻¹ g`, where it exists.

@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use super::Kinds;
 use super::aligned::Alignment;
 use super::gram::Gram;
-use super::motion::{COARSE, FINE, Motion};
+use super::motion::{COARSE, FINE, Motion, Until};
+use super::two_descents;
 use super::two_motions::TwoMotions;
 use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
@@ -20,7 +21,7 @@ const SAME: f64 = 1e-6;
 const SAME_MINIMUM: f64 = 1e-3;
 
 /// Up to so many matches a step on the Sampson errors themselves costs less than one on their [`Gram`] matrix.
-const FEW: usize = 10;
+const FEW: usize = 12;
 
 /// How far behind the best a motion may be and still be kept.
 struct Allowance {
@@ -182,21 +183,32 @@ impl Shortlist {
     /// The local minima of the summed squares of the Sampson errors over all matches that these motions lead to, and the
     /// smallest sum.
     pub(crate) fn refined(&self, gram: &Gram, matches: &[Correspondence]) -> (Self, f64) {
-        let mut coarse = Self { same: SAME_MINIMUM, ..Self::new() };
-        for &Item { kind, mut motion, .. } in self.plausible(gram, &STARTS).iter() {
-            if matches.len() <= FEW {
-                motion.minimise_sampson(matches, f64::INFINITY, &COARSE);
-            } else {
+        let starts = self.plausible(gram, &STARTS);
+        let coarse = if matches.len() <= FEW {
+            starts.descended(matches, &COARSE).0
+        } else {
+            let mut coarse = Self { same: SAME_MINIMUM, ..Self::new() };
+            for &Item { kind, mut motion, .. } in starts.iter() {
                 gram.minimise(&mut motion);
+                coarse.push_pair(kind, motion);
             }
-            coarse.push_pair(kind, motion);
+            coarse
+        };
+        coarse.plausible(gram, &MINIMA).descended(matches, &FINE)
+    }
+
+    /// Where descents on the Sampson errors lead, and the smallest sum of their squares.
+    fn descended(&self, matches: &[Correspondence], until: &Until) -> (Self, f64) {
+        let (mut minima, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
+        for items in self.items[..self.len].chunks(2) {
+            let mut motions = [items[0].motion, items[items.len() - 1].motion];
+            let costs = two_descents::minimise_sampson(&mut motions, matches, until);
+            for ((item, motion), cost) in items.iter().zip(motions).zip(costs) {
+                smallest = smallest.min(cost);
+                minima.push_pair(item.kind, motion);
+            }
         }
-        let (mut fine, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
-        for &Item { kind, mut motion, .. } in coarse.plausible(gram, &MINIMA).iter() {
-            smallest = motion.minimise_sampson(matches, f64::INFINITY, &FINE).min(smallest);
-            fine.push_pair(kind, motion);
-        }
-        (fine, smallest)
+        (minima, smallest)
     }
 
     /// Those whose costs are not too far above the smallest, the best first.
