@@ -20,8 +20,9 @@ const SAME: f64 = 1e-6;
 /// The same for local minima over many matches, which no two of a different origin reach in the same place.
 const SAME_MINIMUM: f64 = 1e-3;
 
-/// Up to so many matches a step on the Sampson errors themselves costs less than one on their [`Gram`] matrix.
-const FEW: usize = 12;
+/// Up to so many matches a step on the Sampson errors themselves costs half of one on their [`Gram`] matrix, and is the better
+/// one: little noise is averaged.
+const FEW: usize = 8;
 
 /// How far behind the best a motion may be and still be kept.
 struct Allowance {

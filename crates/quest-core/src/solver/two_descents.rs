@@ -77,8 +77,7 @@ impl Frames {
     }
 
     fn motions(&self) -> [Motion; 2] {
-        let [from_1, from_2] =
-            [self.from_1, self.from_2].map(|two| two.map(|row| row.map(|entry| entry.to_array())));
+        let [from_1, from_2] = [self.from_1, self.from_2].map(|two| two.map(|row| row.map(Two::to_array)));
         std::array::from_fn(|k| {
             let [from_1, from_2] = [from_1, from_2].map(|two| Matrix3::from_fn(|i, j| two[i][j][k]));
             let r_21 = Rotation3::from_matrix_unchecked(from_2.tr_mul(&from_1));
