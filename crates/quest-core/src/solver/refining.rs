@@ -10,7 +10,7 @@
 
 use super::aligned::{Alignment, Coordinates};
 use super::gram::Gram;
-use super::shortlist::{Shortlist, pure_rotation, rotation_only};
+use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, consensus, one_line};
 use crate::structure::translation_direction;
 use crate::{Candidates, Correspondence, Degeneracy};
@@ -54,7 +54,7 @@ pub(crate) fn solve(
     }
     if kinds == Kinds::All {
         let q0_21 = alignment.q0_21;
-        out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
+        shortlist.push_rotation_only(q0_21, translation_direction(&q0_21, matches));
     }
     shortlist.write(kinds, matches, out);
 }
@@ -80,7 +80,7 @@ fn solve_many(
     }
     if kinds == Kinds::All {
         let q0_21 = gram.alignment.q0_21;
-        out.push(rotation_only(q0_21, &gram.direction(&q0_21), matches));
+        minima.push_rotation_only(q0_21, gram.direction(&q0_21));
     }
     minima.write(kinds, matches, out);
 }
