@@ -37,6 +37,9 @@ pub(crate) struct Record {
     pub(crate) unanswered: usize,
     pub(crate) mean: Option<f64>,
     pub(crate) ci95: Option<f64>,
+    /// The mean of what the errors are more than those of the first solver at the same scenes.
+    pub(crate) difference: Option<f64>,
+    pub(crate) difference_ci95: Option<f64>,
     pub(crate) median: Option<f64>,
     /// Of times, the fastest round: what the machine's other work disturbs least.
     pub(crate) smallest: Option<f64>,
@@ -52,6 +55,15 @@ impl Record {
             ci95: statistics.and_then(|s| s.ci95),
             median: statistics.map(|s| s.median),
             smallest: statistics.map(|s| s.smallest),
+            ..self
+        }
+    }
+
+    /// Fills in the comparison with the first solver.
+    pub(crate) fn beside(self, differences: Option<Statistics>) -> Self {
+        Self {
+            difference: differences.map(|s| s.mean),
+            difference_ci95: differences.and_then(|s| s.ci95),
             ..self
         }
     }

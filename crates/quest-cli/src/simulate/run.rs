@@ -120,6 +120,8 @@ impl Run {
                 let answers: Vec<PoseErrors> = trials.iter().filter_map(|trial| trial[s][r]).collect();
                 let record = |quantity, error: fn(&PoseErrors) -> f64| {
                     let values: Vec<f64> = answers.iter().map(error).collect();
+                    let beside = |trial: &Trial| Some(error(&trial[s][r]?) - error(&trial[0][r]?));
+                    let differences: Vec<f64> = trials.iter().filter_map(beside).collect();
                     let record = Record {
                         experiment: format!("figure {}", figure.number()),
                         scenes: self.scenes,
@@ -132,11 +134,14 @@ impl Run {
                         unanswered: trials.len() - answers.len(),
                         mean: None,
                         ci95: None,
+                        difference: None,
+                        difference_ci95: None,
                         median: None,
                         smallest: None,
                         paper: None,
                     };
-                    record.with(Statistics::of(&values))
+                    let differences = Statistics::of(&differences).filter(|_| s > 0);
+                    record.with(Statistics::of(&values)).beside(differences)
                 };
                 records.push(record(Quantity::RotationRad, |e| e.rotation));
                 // There is no translation to be found in a rotation.

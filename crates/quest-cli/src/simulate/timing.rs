@@ -110,6 +110,8 @@ fn record(run: &Run, row: &Row) -> Record {
         unanswered: 0,
         mean: None,
         ci95: None,
+        difference: None,
+        difference_ci95: None,
         median: None,
         smallest: None,
         paper: paper.map(|(.., ms)| *ms),
