@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use quest_core::{
     simulate::{Cell, Figure, PoseErrors, Reading, SceneError, SceneOptions},
-    solver::SolverName,
+    solver::{Kinds, SolverName},
 };
 use rayon::prelude::*;
 
@@ -19,6 +19,8 @@ pub(crate) struct Run {
     pub(crate) trials: Option<u32>,
     /// The solvers asked for; those of the paper's figure, and ours, if none are.
     pub(crate) solvers: Vec<SolverName>,
+    /// Which candidates they return.
+    pub(crate) kinds: Kinds,
     pub(crate) seed: u64,
     /// The name of the kind of scenes.
     pub(crate) scenes: &'static str,
@@ -108,7 +110,7 @@ impl Run {
         let trial = |index: u32| {
             let problem = cell.problem(self.seed, index)?;
             bar.inc(1);
-            Ok(solvers.iter().map(|&solver| problem.judge(solver)).collect())
+            Ok(solvers.iter().map(|&solver| problem.judge(solver, self.kinds)).collect())
         };
         (0..self.trials_of(figure)).into_par_iter().map(trial).collect()
     }

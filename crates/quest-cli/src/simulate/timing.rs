@@ -104,7 +104,7 @@ fn record(run: &Run, row: &Row) -> Record {
         varied: "points",
         value: row.points as f64,
         solver: name,
-        reading: if row.kinds == Kinds::Exact { "exact" } else { "all" },
+        reading: row.kinds.name(),
         quantity: Quantity::TimeMs,
         trials: row.rounds_ms.len(),
         unanswered: 0,
