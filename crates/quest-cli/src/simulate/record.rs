@@ -5,10 +5,11 @@ use serde::Serialize;
 use super::statistics::Statistics;
 
 /// What is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Quantity {
     /// (61), in radians.
+    #[default]
     RotationRad,
     /// (62), in radians.
     TranslationRad,
@@ -17,7 +18,7 @@ pub(crate) enum Quantity {
 }
 
 /// A row of the result.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Record {
     /// `figure 4`, `table 1`.
     pub(crate) experiment: String,

@@ -1,6 +1,5 @@
 //! Runs experiments: trials in parallel, their numbers in order.
 
-use indicatif::{ProgressBar, ProgressStyle};
 use quest_core::{
     simulate::{Cell, Figure, PoseErrors, Reading, SceneError, SceneOptions},
     solver::{Kinds, SolverName},
@@ -8,7 +7,7 @@ use quest_core::{
 use rayon::prelude::*;
 
 use super::{Record, record::Quantity, statistics::Statistics, timing};
-use crate::Failure;
+use crate::{Failure, progress::Progress};
 
 /// What is run.
 #[derive(Clone, Debug)]
@@ -60,39 +59,31 @@ impl Run {
     pub(crate) fn execute(&self) -> Result<Vec<Record>, Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
         let pool = pool.map_err(|error| Failure::Arguments(format!("--threads: {error}")))?;
-        let bar = self.progress_bar();
+        let progress = self.progress();
         let mut records = Vec::new();
         for &figure in &self.figures {
-            bar.set_message(format!("figure {}", figure.number()));
-            records.extend(pool.install(|| self.figure(figure, &bar))?);
+            progress.begin(format!("figure {}", figure.number()));
+            records.extend(pool.install(|| self.figure(figure, &progress))?);
         }
         if self.has_table {
-            bar.set_message("table 1");
+            progress.begin("table 1".to_owned());
             records.extend(timing::table(self)?);
         }
-        bar.finish_and_clear();
+        progress.finish();
         Ok(records)
     }
 
-    /// On standard error where it is a terminal, else nowhere.
-    fn progress_bar(&self) -> ProgressBar {
-        if self.is_quiet {
-            return ProgressBar::hidden();
-        }
+    fn progress(&self) -> Progress {
         let cells = |&figure: &Figure| figure.cells(&self.base).len() as u64;
-        let trials: u64 = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
-        let bar = ProgressBar::new(trials);
-        if let Ok(style) = ProgressStyle::with_template("{msg:9} {wide_bar} {pos}/{len} scenes, {eta} left") {
-            bar.set_style(style);
-        }
-        bar
+        let scenes = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
+        Progress::new("scenes", Some(scenes), self.is_quiet)
     }
 
-    fn figure(&self, figure: Figure, bar: &ProgressBar) -> Result<Vec<Record>, SceneError> {
+    fn figure(&self, figure: Figure, progress: &Progress) -> Result<Vec<Record>, SceneError> {
         let solvers = self.solvers_of(figure);
         let cells = figure.cells(&self.base);
         let of_cell = |cell: &Cell| {
-            let trials = self.trials(cell, figure, &solvers, bar)?;
+            let trials = self.trials(cell, figure, &solvers, progress)?;
             Ok(self.records(figure, cell, &solvers, &trials))
         };
         // Collected in the order of the cells, whatever thread was faster.
@@ -105,11 +96,11 @@ impl Run {
         cell: &Cell,
         figure: Figure,
         solvers: &[SolverName],
-        bar: &ProgressBar,
+        progress: &Progress,
     ) -> Result<Vec<Trial>, SceneError> {
         let trial = |index: u32| {
             let problem = cell.problem(self.seed, index)?;
-            bar.inc(1);
+            progress.add(1);
             Ok(solvers.iter().map(|&solver| problem.judge(solver, self.kinds)).collect())
         };
         (0..self.trials_of(figure)).into_par_iter().map(trial).collect()
@@ -134,13 +125,7 @@ impl Run {
                         quantity,
                         trials: trials.len(),
                         unanswered: trials.len() - answers.len(),
-                        mean: None,
-                        ci95: None,
-                        difference: None,
-                        difference_ci95: None,
-                        median: None,
-                        smallest: None,
-                        paper: None,
+                        ..Record::default()
                     };
                     let differences = Statistics::of(&differences).filter(|_| s > 0);
                     record.with(Statistics::of(&values)).beside(differences)

@@ -107,14 +107,8 @@ fn record(run: &Run, row: &Row) -> Record {
         reading: row.kinds.name(),
         quantity: Quantity::TimeMs,
         trials: row.rounds_ms.len(),
-        unanswered: 0,
-        mean: None,
-        ci95: None,
-        difference: None,
-        difference_ci95: None,
-        median: None,
-        smallest: None,
         paper: paper.map(|(.., ms)| *ms),
+        ..Record::default()
     };
     record.with(Statistics::of(&row.rounds_ms))
 }
