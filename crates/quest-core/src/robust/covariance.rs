@@ -22,7 +22,7 @@ use crate::solver::motion::Motion;
 const STEP: f64 = 1e-5;
 
 /// Matches that the derivatives of the length are taken over.
-const ENOUGH: usize = 200;
+const ENOUGH: usize = 100;
 
 /// The covariance of the five parameters of a motion.
 fn of_motion(

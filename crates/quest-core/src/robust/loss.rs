@@ -67,7 +67,7 @@ impl HeavyTailed {
     }
 
     /// By the rule of midpoints, which for functions as smooth as these is exact to four digits.
-    pub(super) fn of_normal(&self, sigma: f64) -> NormalMeans {
+    pub(super) fn of_normal(self, sigma: f64) -> NormalMeans {
         const REACH: f64 = 6.0;
         const NODES: u32 = 48;
         let mut means = NormalMeans { square: 0.0, slope: 0.0 };
