@@ -1,9 +1,9 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
-//! It is `(E[ψ²] H⁻¹ + H⁻¹ S H⁻¹) / E[ψ']²` with `H = Σ J Jᵀ` over the inliers and `ψ` the influence of a residual under the last
-//! refinement's loss, its means those of normal noise as large as the inliers show. `S` is what false matches that happen to agree with the pose pull at it: as many as there are
-//! outliers are expected to have `S = Σ ψ² J Jᵀ`, which is measured on false matches (see
-//! [`significance`](super::significance)).
+//! It is `(E[ψ²] H⁻¹ + H⁻¹ S H⁻¹) / E[ψ']²` with `H = Σ J Jᵀ` over the inliers and `ψ` the influence of a residual under the
+//! last refinement's loss, the means being those of normal noise as large as the inliers show. `S` is what false matches
+//! that happen to agree with the pose pull at it: as many as there are outliers are expected to have `S = Σ ψ² J Jᵀ`, which is
+//! measured on false matches (see [`significance`](super::significance)).
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};

@@ -47,8 +47,8 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
         refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
         take_better(poses, &mut best, motion);
     }
-    let noise = sigma(poses, &best.motion);
-    let noise = noise::prudent(noise, poses.inliers.len(), threshold);
+    let shown = sigma(poses, &best.motion);
+    let noise = noise::prudent(shown, poses.inliers.len(), threshold);
     let (loss, limit) = (HeavyTailed::new(WIDTH * noise), WIDE * noise);
     poses.score(best.motion, limit);
     if poses.inliers.len() >= FEWEST {
