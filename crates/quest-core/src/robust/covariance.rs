@@ -3,7 +3,8 @@
 //! It is `(E[ψ²] H⁻¹ + H⁻¹ S H⁻¹) / E[ψ']²` with `H = Σ J Jᵀ` over the inliers and `ψ` the influence of a residual under the
 //! last refinement's loss, the means being those of normal noise as large as the inliers show. `S` is what false matches
 //! that happen to agree with the pose pull at it: as many as there are outliers are expected to have `S = Σ ψ² J Jᵀ`, which is
-//! measured on false matches (see [`significance`](super::significance)).
+//! measured on false matches (see [`significance`](super::significance)). For few inliers there is a factor close to one
+//! (P. J. Huber, *Robust statistics*, 1981, section 7.6).
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
@@ -38,7 +39,9 @@ fn of_motion(
     let outliers = (observations.len() - inliers.len()) as f64;
     let pull = pull_of_a_match(false_matches, motion, polished) * outliers;
     let normal = polished.loss.of_normal(polished.sigma);
-    Some((inverse * normal.square + inverse * pull * inverse) / normal.slope.powi(2))
+    let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
+    let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
+    Some((inverse * normal.square + inverse * pull * inverse) * (few * few))
 }
 
 /// The mean of `ψ² J Jᵀ` over false matches, most of which are too far off to count.
