@@ -5,7 +5,12 @@
 //! contributions II/11 (balancing), II/13 (elimination to Hessenberg form), II/14 (Francis' implicit double
 //! shift) and II/18 (inverse iteration), for row-major arrays of fixed size.
 
+use std::array::from_fn;
+
 use nalgebra::{Complex, ComplexField};
+
+use super::number::Number;
+use super::two::Two;
 
 /// Sweeps a single eigenvalue may take before the matrix is given up; about three are usual.
 const MAX_SWEEPS: usize = 60;
@@ -156,7 +161,7 @@ fn balance<const N: usize>(a: &mut [[f64; N]; N]) -> [f64; N] {
 /// Reduces to upper Hessenberg form by stabilised elementary similarity transformations: half the work of
 /// reflections. Their factors are left below the subdiagonal; with which row each was exchanged is returned.
 fn to_hessenberg<const N: usize>(a: &mut [[f64; N]; N]) -> [usize; N] {
-    let mut pivots = std::array::from_fn(|m| m);
+    let mut pivots = from_fn(|m| m);
     for m in 1..N.saturating_sub(1) {
         let pivot = (m..N).fold(m, |best, i| if a[i][m - 1].abs() > a[best][m - 1].abs() { i } else { best });
         pivots[m] = pivot;
@@ -169,26 +174,42 @@ fn to_hessenberg<const N: usize>(a: &mut [[f64; N]; N]) -> [usize; N] {
                 row.swap(pivot, m);
             }
         }
-        let pivot_row = a[m];
-        let inverse = 1.0 / pivot_row[m - 1];
-        let mut factors = [0.0; N];
+        // Every row behind m loses a multiple of row m; column m gains the same multiples of the columns behind it.
+        let inverse = 1.0 / a[m][m - 1];
+        let mut gains = [0.0; N];
+        gains[m] = 1.0;
         for i in m + 1..N {
-            let factor = a[i][m - 1] * inverse;
-            factors[i] = factor;
-            a[i][m - 1] = factor;
-            for j in m..N {
-                a[i][j] -= factor * pivot_row[j];
-            }
+            gains[i] = a[i][m - 1] * inverse;
         }
-        for row in a.iter_mut() {
-            let mut sum = row[m];
-            for j in m + 1..N {
-                sum += factors[j] * row[j];
+        // By whole pairs of columns: what stands left of column m takes no part.
+        let mut pivot_row = a[m];
+        pivot_row[m - 1] = 0.0;
+        let (pivot_row, pairs) = (&pairs(&pivot_row)[m / 2..], &pairs(&gains)[m / 2..]);
+        for (i, row) in a.iter_mut().enumerate() {
+            let mut sum = Two::ZERO;
+            let x = row.as_chunks_mut::<2>().0[m / 2..].iter_mut().zip(pairs);
+            if i > m {
+                for ((x, gain), y) in x.zip(pivot_row) {
+                    let rest = Two::new(*x) - Two::new(*y) * gains[i];
+                    *x = rest.to_array();
+                    sum += rest * Two::new(*gain);
+                }
+                row[m - 1] = gains[i];
+            } else {
+                for (x, gain) in x {
+                    sum += Two::new(*x) * Two::new(*gain);
+                }
             }
-            row[m] = sum;
+            row[m] = sum.reduce_add();
         }
     }
     pivots
+}
+
+/// The entries of a row, two and two.
+fn pairs<const N: usize>(row: &[f64; N]) -> &[[f64; 2]] {
+    const { assert!(N.is_multiple_of(2)) }
+    row.as_chunks().0
 }
 
 /// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration.
@@ -240,14 +261,14 @@ fn hessenberg_eigenvalues<const N: usize>(h: &mut [[f64; N]; N]) -> Option<[Comp
 
 /// The first row of the unreduced block that ends at `last`.
 fn block_start<const N: usize>(h: &[[f64; N]; N], last: usize, norm: f64) -> usize {
+    let mut below = h[last][last].abs();
     for l in (1..=last).rev() {
-        let mut neighbours = h[l - 1][l - 1].abs() + h[l][l].abs();
-        if neighbours == 0.0 {
-            neighbours = norm;
-        }
+        let above = h[l - 1][l - 1].abs();
+        let neighbours = (above + below).max(f64::EPSILON * norm);
         if h[l][l - 1].abs() <= f64::EPSILON * 0.5 * neighbours {
             return l;
         }
+        below = above;
     }
     0
 }
@@ -272,127 +293,136 @@ struct Shift {
     w: f64,
 }
 
-/// The start of the bulge: where two consecutive subdiagonal entries are small it may begin further down.
-fn bulge_start<const N: usize>(
-    h: &[[f64; N]; N],
-    first: usize,
-    last: usize,
-    shift: &Shift,
-) -> (usize, [f64; 3]) {
-    let mut m = last - 2;
-    loop {
-        let z = h[m][m];
-        let (r, s) = (shift.x - z, shift.y - z);
-        let mut v =
-            [(r * s - shift.w) / h[m + 1][m] + h[m][m + 1], h[m + 1][m + 1] - z - r - s, h[m + 2][m + 1]];
-        let size = v[0].abs() + v[1].abs() + v[2].abs();
-        let over_size = 1.0 / size;
-        for x in &mut v {
-            *x *= over_size;
-        }
-        if m == first {
-            return (m, v);
-        }
-        let small = h[m][m - 1].abs() * (v[1].abs() + v[2].abs());
-        let large = v[0].abs() * (h[m - 1][m - 1].abs() + z.abs() + h[m + 1][m + 1].abs());
-        if small <= f64::EPSILON * 0.5 * large {
-            return (m, v);
-        }
-        m -= 1;
-    }
+/// The first column of `(H − x I)(H − y I)` on the block that starts at `k`, up to scale, for the two shifts `x, y`.
+fn bulge<const N: usize>(h: &[[f64; N]; N], k: usize, shift: &Shift) -> [f64; 3] {
+    let (z, below) = (h[k][k], h[k + 1][k]);
+    let (r, s) = (shift.x - z, shift.y - z);
+    let v = [
+        r * s - shift.w + below * h[k][k + 1],
+        below * (h[k + 1][k + 1] - z - r - s),
+        below * h[k + 2][k + 1],
+    ];
+    let over_size = 1.0 / (v[0].abs() + v[1].abs() + v[2].abs());
+    v.map(|x| x * over_size)
 }
 
 /// One implicit double-shift sweep on the block `first..=last`: a 3 × 3 bulge is chased down by reflections.
+///
+/// Every reflection waits for the one before, through a square root and a division, but only where rows and columns of the
+/// two meet. That part comes first, so that the next reflection is under way while the rest of the matrix is reflected.
 fn francis_sweep<const N: usize>(h: &mut [[f64; N]; N], first: usize, last: usize, shift: &Shift) {
-    let (start, mut v) = bulge_start(h, first, last, shift);
-    for i in start + 2..=last {
-        h[i][i - 2] = 0.0;
-        if i > start + 2 {
-            h[i][i - 3] = 0.0;
-        }
+    let mut now = Reflection::new(bulge(h, first, shift));
+    // What stands below the subdiagonal is zero, though not stored; this one is about to be read.
+    h[first + 2][first] = 0.0;
+    for k in first..last - 1 {
+        let next = Reflection::new(now.reflect_bulge::<3, N>(h, k, last));
+        now.reflect_rows(h, k, last);
+        now.reflect_columns::<3, N>(h, k, first);
+        h[k + 1][k] = -next.s;
+        now = next;
     }
-    for k in start..last {
-        let three = k + 1 < last;
-        if k != start {
-            v = [h[k][k - 1], h[k + 1][k - 1], if three { h[k + 2][k - 1] } else { 0.0 }];
-        }
+    now.reflect_bulge::<2, N>(h, last - 1, last);
+    now.reflect_columns::<2, N>(h, last - 1, first);
+}
+
+/// The reflection `I − u wᵀ` that takes `v` to `(−s, 0, 0)`: `u = (v + s e1) / s`, and `w` is `u` scaled to `w_0 = 1`. Applied
+/// from row and column `k` on; to two of them where there are no three, with `v_2 = 0`.
+struct Reflection {
+    s: f64,
+    u: [f64; 3],
+    w: [f64; 3],
+}
+
+impl Reflection {
+    #[inline]
+    fn new(v: [f64; 3]) -> Self {
         // The matrix is balanced, so the squares stay in range.
         let s = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt().copysign(v[0]);
         if s == 0.0 {
-            continue;
+            return Self { s, u: [0.0; 3], w: [1.0, 0.0, 0.0] };
         }
-        if k != start {
-            h[k][k - 1] = -s;
-        } else if first != start {
-            h[k][k - 1] = -h[k][k - 1];
-        }
-        // The reflection I − u wᵀ with u = (v + s e1) / s and w = u normalised to w_0 = 1.
         let p = v[0] + s;
         let (over_s, over_p) = (1.0 / s, 1.0 / p);
-        let u = [p * over_s, v[1] * over_s, v[2] * over_s];
-        let w = [1.0, v[1] * over_p, v[2] * over_p];
-        reflect_rows(h, k, last, three, u, w);
-        reflect_columns(h, k, first, last, three, u, w);
+        Self { s, u: [p * over_s, v[1] * over_s, v[2] * over_s], w: [1.0, v[1] * over_p, v[2] * over_p] }
     }
-}
 
-/// Applies the reflection to rows `k`, `k + 1` and, where there are three, `k + 2`.
-#[inline]
-fn reflect_rows<const N: usize>(
-    h: &mut [[f64; N]; N],
-    k: usize,
-    last: usize,
-    three: bool,
-    u: [f64; 3],
-    w: [f64; 3],
-) {
-    // Slices of one length, so that the compiler drops the bounds checks and vectorises.
-    let columns = k..=last;
-    if three {
-        let [row0, row1, row2, ..] = &mut h[k..] else { return };
-        let row0 = row0[columns.clone()].iter_mut();
-        for ((x, y), z) in row0.zip(&mut row1[columns.clone()]).zip(&mut row2[columns]) {
-            let sum = *x + w[1] * *y + w[2] * *z;
-            *x -= sum * u[0];
-            *y -= sum * u[1];
-            *z -= sum * u[2];
+    /// `x ← (I − u wᵀ) x`: from the left.
+    #[inline]
+    fn times<T: Number, const M: usize>(&self, x: [T; M]) -> [T; M] {
+        let sum = (1..M).fold(x[0], |sum, i| sum + x[i].times(self.w[i]));
+        from_fn(|i| x[i] - sum.times(self.u[i]))
+    }
+
+    /// `xᵀ ← xᵀ (I − u wᵀ)`: from the right.
+    #[inline]
+    fn transposed_times<T: Number, const M: usize>(&self, x: [T; M]) -> [T; M] {
+        let sum = (1..M).fold(x[0].times(self.u[0]), |sum, i| sum + x[i].times(self.u[i]));
+        from_fn(|i| if i == 0 { x[i] - sum } else { x[i] - sum.times(self.w[i]) })
+    }
+
+    /// Reflects `M` rows and columns where they meet, and the row below. The next `v`: the first column, from the second row on.
+    #[inline]
+    fn reflect_bulge<const M: usize, const N: usize>(
+        &self,
+        h: &mut [[f64; N]; N],
+        k: usize,
+        last: usize,
+    ) -> [f64; 3] {
+        let mut next = [0.0; 3];
+        let columns: [[f64; M]; M] = from_fn(|j| self.times(from_fn(|i| h[k + i][k + j])));
+        for i in 0..M {
+            let row = self.transposed_times::<f64, M>(from_fn(|j| columns[j][i]));
+            h[k + i][k..k + M].copy_from_slice(&row);
+            if i > 0 {
+                next[i - 1] = row[0];
+            }
         }
-    } else {
-        let [row0, row1, ..] = &mut h[k..] else { return };
-        for (x, y) in row0[columns.clone()].iter_mut().zip(&mut row1[columns]) {
-            let sum = *x + w[1] * *y;
-            *x -= sum * u[0];
-            *y -= sum * u[1];
+        if k + M <= last {
+            let below = &mut h[k + M][k..k + M];
+            let mut row = [0.0; M];
+            row[M - 1] = below[M - 1];
+            row = self.transposed_times(row);
+            below.copy_from_slice(&row);
+            next[M - 1] = row[0];
+        }
+        next
+    }
+
+    /// Reflects three rows right of the bulge. By pairs of columns that begin with an even one: past the last column it does
+    /// no harm.
+    #[inline]
+    fn reflect_rows<const N: usize>(&self, h: &mut [[f64; N]; N], k: usize, last: usize) {
+        let [a, b, c, ..] = &mut h[k..] else { return };
+        let j = k + 3;
+        if j % 2 == 1 && j <= last {
+            [a[j], b[j], c[j]] = self.times([a[j], b[j], c[j]]);
+        }
+        let columns = j.div_ceil(2)..last / 2 + 1;
+        let [a, b, c] = [a, b, c].map(|row| row.as_chunks_mut::<2>().0[columns.clone()].iter_mut());
+        for ((a, b), c) in a.zip(b).zip(c) {
+            [*a, *b, *c] = self.times([*a, *b, *c].map(Two::new)).map(Two::to_array);
         }
     }
-}
 
-/// Applies the reflection to columns `k`, `k + 1` and, where there are three, `k + 2`.
-#[inline]
-fn reflect_columns<const N: usize>(
-    h: &mut [[f64; N]; N],
-    k: usize,
-    first: usize,
-    last: usize,
-    three: bool,
-    u: [f64; 3],
-    w: [f64; 3],
-) {
-    let rows = &mut h[first..=last.min(k + 3)];
-    if three {
-        for row in rows {
-            let Some([x, y, z]) = row[k..].first_chunk_mut::<3>() else { return };
-            let sum = u[0] * *x + u[1] * *y + u[2] * *z;
-            *x -= sum;
-            *y -= sum * w[1];
-            *z -= sum * w[2];
+    /// Reflects `M` columns above the bulge. By pairs of rows that begin with an even one: ahead of the first row it does no
+    /// harm.
+    #[inline]
+    fn reflect_columns<const M: usize, const N: usize>(&self, h: &mut [[f64; N]; N], k: usize, first: usize) {
+        if k % 2 == 1
+            && k > first
+            && let Some(row) = h[k - 1][k..].first_chunk_mut::<M>()
+        {
+            *row = self.transposed_times(*row);
         }
-    } else {
-        for row in rows {
-            let Some([x, y]) = row[k..].first_chunk_mut::<2>() else { return };
-            let sum = u[0] * *x + u[1] * *y;
-            *x -= sum;
-            *y -= sum * w[1];
+        let rows = (first / 2).min(k / 2)..k / 2;
+        for [a, b] in &mut h.as_chunks_mut::<2>().0[rows] {
+            let (Some(a), Some(b)) = (a[k..].first_chunk_mut::<M>(), b[k..].first_chunk_mut::<M>()) else {
+                return;
+            };
+            let reflected = self.transposed_times::<Two, M>(from_fn(|i| Two::new([a[i], b[i]])));
+            for (i, x) in reflected.into_iter().enumerate() {
+                [a[i], b[i]] = x.to_array();
+            }
         }
     }
 }
