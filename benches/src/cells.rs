@@ -29,10 +29,7 @@ impl Cell {
     /// The name of the kinds.
     #[must_use]
     pub fn kinds_name(self) -> &'static str {
-        match self.kinds {
-            Kinds::Exact => "exact",
-            Kinds::All => "all",
-        }
+        self.kinds.name()
     }
 
     /// Solves.

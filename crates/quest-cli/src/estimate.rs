@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
     }
     let mut writer = Writer::open(&arguments.output, is_lines)?;
-    let mut progress = Progress::new("pairs", arguments.output.quiet);
+    let progress = Progress::new("pairs", None, arguments.output.quiet);
     let mut outcome = Outcome::Answer;
     let numbered = (0..).map_while(|index| Some((index, pairs.next().transpose()?)));
     in_order(

@@ -25,12 +25,13 @@ use clap::{Parser, Subcommand};
 
 const EXAMPLES: &str = "\
 Examples:
-  quest-cli solve examples/points.json             a table of the candidate poses
+  quest-cli solve examples/points.json                  a table of the candidate poses
+  quest-cli solve --format json pair.json | jq          the same for programs
+  quest-cli view examples/points.json -o view.html      the same in three dimensions
   quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
-  quest-cli solve --format json pair.json | jq     the same for programs
-  quest-cli simulate --figure 4 --plot errors.html the experiments of the paper
-  quest-cli servo --scenario robot --noise 0.5     a robot that drives to where an image was taken
-  quest-cli solvers                                the solvers to choose from
+  quest-cli simulate --figure 4 --plot errors.html      the experiments of the paper
+  quest-cli servo --scenario robot --noise 0.5          a robot that drives to where an image was taken
+  quest-cli solvers                                     the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
 

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use quest_core::{Camera, solver::SolverName};
+use quest_core::{
+    Camera,
+    solver::{Kinds, SolverName},
+};
 use quest_io::{Output, WriteError};
 
 /// How a result is written.
@@ -90,6 +93,12 @@ pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
     };
     let params = parts.map(number).collect::<Result<Vec<_>, _>>()?;
     quest_io::camera(model, Some(size), &params).map_err(|error| format!("{error}; {EXPECTED}"))
+}
+
+/// Kinds of candidates by their name, with the names listed in the help.
+pub(crate) fn kinds_parser() -> impl clap::builder::TypedValueParser<Value = Kinds> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    PossibleValuesParser::new(Kinds::CHOICES.map(Kinds::name)).try_map(|name| name.parse::<Kinds>())
 }
 
 /// A solver by its name, with the names listed in the help.

@@ -1,6 +1,7 @@
 //! A bar on standard error for what takes longer than a second.
 
 use std::io::{self, IsTerminal};
+use std::sync::Once;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,33 +9,41 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// Nothing is shown before.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Counts what is done; on a terminal, after a second, where people can see it.
+/// Counts what is done, on any thread; on a terminal, after a second, where people can see it.
 pub(crate) struct Progress {
     bar: ProgressBar,
     start: Instant,
-    is_shown: bool,
+    shown: Once,
     is_wanted: bool,
 }
 
 impl Progress {
-    /// A count of `noun`; of an unknown total.
-    pub(crate) fn new(noun: &'static str, quiet: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {pos} {msg} in {elapsed}, {per_sec}") {
+    /// A count of `noun`, out of a total where that is known.
+    pub(crate) fn new(noun: &'static str, total: Option<u64>, quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(total, ProgressDrawTarget::hidden());
+        let template = match total {
+            Some(_) => "{prefix} {wide_bar} {pos}/{len} {msg}, {eta} left",
+            None => "{spinner} {pos} {msg} in {elapsed}, {per_sec}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar.set_message(noun);
         let is_wanted = !quiet && io::stderr().is_terminal();
-        Self { bar, start: Instant::now(), is_shown: false, is_wanted }
+        Self { bar, start: Instant::now(), shown: Once::new(), is_wanted }
+    }
+
+    /// What is being done, ahead of the bar.
+    pub(crate) fn begin(&self, part: String) {
+        self.bar.set_prefix(part);
     }
 
     /// So many more are done.
-    pub(crate) fn add(&mut self, count: usize) {
-        if self.is_wanted && !self.is_shown && self.start.elapsed() > PATIENCE {
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-            self.is_shown = true;
+    pub(crate) fn add(&self, count: u64) {
+        if self.is_wanted && self.start.elapsed() > PATIENCE {
+            self.shown.call_once(|| self.bar.set_draw_target(ProgressDrawTarget::stderr()));
         }
-        self.bar.inc(count as u64);
+        self.bar.inc(count);
     }
 
     /// Removes the bar.

@@ -16,8 +16,16 @@ pub(crate) fn write_line<T: Serialize>(writer: &mut dyn Write, record: &T) -> io
 /// A header and one row of CSV for each record.
 pub(crate) fn write_csv<T: Serialize>(writer: &mut dyn Write, records: &[T]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(writer);
-    records.iter().try_for_each(|record| csv.serialize(record)).map_err(io::Error::from)?;
+    records.iter().try_for_each(|record| csv.serialize(record)).map_err(plain)?;
     csv.flush()
+}
+
+/// The error of the target itself, by whose kind a closed pipe is told from a full disk.
+fn plain(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    }
 }
 
 /// The columns of [`write_candidates`]. The depths, which differ in number, are left to JSON.
@@ -46,22 +54,21 @@ const COLUMNS: [&str; 18] = [
 /// the header.
 pub(crate) fn write_candidates(writer: &mut dyn Write, pair: usize, record: &SolveRecord) -> io::Result<()> {
     let rows = record.candidates.iter().enumerate().map(|(i, candidate)| row(pair, i + 1, record, candidate));
-    write_rows(writer, (pair == 1).then_some(&COLUMNS), rows)
+    write_rows(writer, header(pair, COLUMNS).into_iter().chain(rows.map(Vec::from)))
 }
 
-/// Rows of CSV, after a header where there is one.
-fn write_rows<R: IntoIterator<Item = String>>(
+/// The columns of the first pair.
+fn header<const N: usize>(pair: usize, columns: [&str; N]) -> Option<Vec<String>> {
+    (pair == 1).then(|| columns.map(str::to_owned).to_vec())
+}
+
+/// Rows of CSV.
+pub(crate) fn write_rows(
     writer: &mut dyn Write,
-    header: Option<&[&str]>,
-    rows: impl IntoIterator<Item = R>,
+    rows: impl IntoIterator<Item = Vec<String>>,
 ) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(writer);
-    if let Some(header) = header {
-        csv.write_record(header)?;
-    }
-    for row in rows {
-        csv.write_record(row.into_iter().collect::<Vec<_>>())?;
-    }
+    rows.into_iter().try_for_each(|row| csv.write_record(row)).map_err(plain)?;
     csv.flush()
 }
 
@@ -133,10 +140,10 @@ pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &Estim
     for error in [record.rotation_error_deg, record.translation_error_deg] {
         row.push(error.map(text).unwrap_or_default());
     }
-    write_rows(writer, (pair == 1).then_some(&ESTIMATE_COLUMNS), [row])
+    write_rows(writer, header(pair, ESTIMATE_COLUMNS).into_iter().chain([row]))
 }
 
 /// All digits, with an exponent where it is shorter; nothing for what is not a number.
-fn text(x: f64) -> String {
+pub(crate) fn text(x: f64) -> String {
     if x.is_finite() { format!("{x:?}") } else { String::new() }
 }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use quest_core::{
     Candidates, Correspondence, Degeneracy, InputError,
     solver::{Kinds, SolverName},
@@ -12,7 +12,7 @@ use quest_io::{Pair, ReadError, SolveRecord};
 use crate::{
     Failure, Outcome, candidate_table,
     input::InputOptions,
-    options::{OutputOptions, solver_parser},
+    options::{OutputOptions, kinds_parser, solver_parser},
     rows, words,
     writer::{Record, Writer},
 };
@@ -55,20 +55,15 @@ pub(crate) struct Arguments {
     /// The solver; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
-    /// Which candidates are computed: also real parts of complex solutions and the rotation alone, or not.
-    #[arg(long, value_enum, default_value_t = KindsArgument::All)]
-    kinds: KindsArgument,
+    /// Which candidates are computed: the real solutions alone (exact), also real parts of complex ones and the rotation
+    /// alone (all), also the motions of a plane if one explains the matches (planar).
+    #[arg(long, value_name = "KINDS", default_value = Kinds::default().name(), value_parser = kinds_parser())]
+    kinds: Kinds,
     /// List also the candidates that have points behind a camera.
     #[arg(long)]
     all: bool,
     #[command(flatten)]
     output: OutputOptions,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum KindsArgument {
-    All,
-    Exact,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -94,11 +89,7 @@ fn one_pair(
     let info = arguments.solver.info();
     let matches = enough_matches(pair, arguments.solver)?;
     let mut found = Candidates::new();
-    let kinds = match arguments.kinds {
-        KindsArgument::All => Kinds::All,
-        KindsArgument::Exact => Kinds::Exact,
-    };
-    arguments.solver.solve(kinds, &matches, &mut found);
+    arguments.solver.solve(arguments.kinds, &matches, &mut found);
     // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
     if let (false, true, Some(degeneracy)) = (is_lines, found.is_empty(), found.degeneracy()) {
         return Err(pair.refuse(InputError::Degenerate(degeneracy)).into());

@@ -15,16 +15,20 @@ pub enum CandidateKind {
     FromComplex,
     /// The rotation that best aligns the bearings, as if there were no translation.
     RotationOnly,
+    /// A motion of the plane that best explains the matches. Where the points do lie on one, it makes use of all of the
+    /// matches, and under noise comes closer to the truth than what fits five of them exactly.
+    Planar,
 }
 
 impl CandidateKind {
-    /// The name in files: `exact`, `from_complex`, `rotation_only`.
+    /// The name in files: `exact`, `from_complex`, `rotation_only`, `planar`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
             Self::FromComplex => "from_complex",
             Self::RotationOnly => "rotation_only",
+            Self::Planar => "planar",
         }
     }
 }

@@ -10,10 +10,12 @@
 //! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
 //! `|t|` is then the parallax (63), and goes to zero with it.
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use std::array::from_fn;
 
-use crate::algebra::symmetric::smallest_eigenvector_3;
-use crate::algebra::two::{Two, TwoVectors, both, cross, dot, side_by_side, times};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::algebra::symmetric::{smallest_eigenvector_3, smallest_eigenvectors_3};
+use crate::algebra::two::{Two, TwoVectors, both, cross, dot, rotation, side_by_side};
 use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
 
@@ -28,6 +30,20 @@ pub fn translation_direction(q_21: &UnitQuaternion<f64>, matches: &[Corresponden
         sum += n * n.transpose();
     }
     smallest_eigenvector_3(&sum).unwrap_or_else(Vector3::z)
+}
+
+/// The same for two rotation matrices side by side, row by row; not finite where no direction is left.
+#[inline]
+pub(crate) fn translation_directions(r_21: &[TwoVectors; 3], matches: &[Correspondence]) -> TwoVectors {
+    let mut sum = [Two::ZERO; 6];
+    for m in matches {
+        let (a, b) = (both(m.bearing1()), both(m.bearing2()));
+        let [x, y, z] = cross(&b, &from_fn(|i| dot(&r_21[i], &a)));
+        for (sum, product) in sum.iter_mut().zip([x * x, y * y, z * z, x * y, x * z, y * z]) {
+            *sum += product;
+        }
+    }
+    smallest_eigenvectors_3(&sum)
 }
 
 /// A rotation and a direction of translation, completed by the scale, and what the matches say of them.
@@ -52,38 +68,39 @@ pub fn with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Completed {
-    let r_21 = q_21.to_rotation_matrix().into_inner();
-    let (mut squares, mut tally) = (Two::ZERO, Tally::default());
+    let r_21 = q_21.to_rotation_matrix();
+    let r_21 = from_fn(|i| from_fn(|j| Two::splat(r_21[(i, j)])));
+    let t = both(direction);
+    let mut tally = Tally::default();
     for pair in matches.chunks(2) {
-        let (rays, _) = Rays::new(pair, &r_21, direction);
-        squares += rays.sampson_squares(direction);
-        tally.add(&rays, pair);
+        let second = pair.get(1);
+        let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
+        let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
+        let length1 = Two::new([pair[0].length1(), second.map_or(1.0, Correspondence::length1)]);
+        let length2 = Two::new([pair[0].length2(), second.map_or(1.0, Correspondence::length2)]);
+        tally.add(&Rays::new(&a, &b, &r_21, &t), length1, length2);
     }
-    tally.completed(q_21, direction, squares, matches)
+    tally.sums(Two::reduce_add).completed(q_21, direction, matches)
 }
 
-/// The same for `q_21` and for its twisted partner `t ⊗ q`, which has the same residuals.
-pub(crate) fn pair_with_depths(
-    q_21: UnitQuaternion<f64>,
-    direction: &Vector3<f64>,
+/// The same for two rotations and directions side by side.
+pub(crate) fn two_with_depths(
+    q_21: &[UnitQuaternion<f64>; 2],
+    direction: &[Vector3<f64>; 2],
     matches: &[Correspondence],
 ) -> [Completed; 2] {
-    let r_21 = q_21.to_rotation_matrix().into_inner();
-    let (mut squares, mut first, mut second) = (Two::ZERO, Tally::default(), Tally::default());
-    for pair in matches.chunks(2) {
-        let (rays, b) = Rays::new(pair, &r_21, direction);
-        squares += rays.sampson_squares(direction);
-        first.add(&rays, pair);
-        second.add(&rays.twisted(&b, direction), pair);
+    let r_21 = rotation(&from_fn(|k| Two::new(q_21.map(|q| q.coords[(k + 3) % 4]))));
+    let t = side_by_side(&direction[0], Some(&direction[1]));
+    let mut tally = Tally::default();
+    for m in matches {
+        let rays = Rays::new(&both(m.bearing1()), &both(m.bearing2()), &r_21, &t);
+        tally.add(&rays, Two::splat(m.length1()), Two::splat(m.length2()));
     }
-    let twisted = UnitQuaternion::new_normalize(Quaternion::from_imag(*direction) * q_21.into_inner());
-    [
-        first.completed(q_21, direction, squares, matches),
-        second.completed(twisted, direction, squares, matches),
-    ]
+    from_fn(|k| tally.sums(|x| x.to_array()[k]).completed(q_21[k], &direction[k], matches))
 }
 
-/// What is needed of the rays of two matches (of one, and zeros), `b` of view 2 and `c` of view 1 after the rotation.
+/// What is needed of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: two matches, or one match after
+/// two rotations.
 struct Rays {
     /// `b × c`.
     normal: TwoVectors,
@@ -91,62 +108,43 @@ struct Rays {
     cosine: Two,
     /// `t · b` and `t · c`.
     along: [Two; 2],
+    /// The squared Sampson errors.
+    squares: Two,
 }
 
 impl Rays {
-    /// Together with `b`.
     #[inline]
-    fn new(pair: &[Correspondence], r_21: &Matrix3<f64>, direction: &Vector3<f64>) -> (Self, TwoVectors) {
-        let second = pair.get(1);
-        let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
-        let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
-        let (c, t) = (times(r_21, &a), both(direction));
-        (Self { normal: cross(&b, &c), cosine: dot(&b, &c), along: [dot(&t, &b), dot(&t, &c)] }, b)
-    }
-
-    /// With `c` turned by 180° about the translation, `c' = 2 t (t · c) − c`.
-    #[inline]
-    fn twisted(&self, b: &TwoVectors, direction: &Vector3<f64>) -> Self {
-        let ([tb, tc], across) = (self.along, cross(b, &both(direction)));
-        let twice = tc + tc;
-        Self {
-            normal: std::array::from_fn(|k| across[k] * twice - self.normal[k]),
-            cosine: tb * twice - self.cosine,
-            along: self.along,
-        }
-    }
-
-    /// The squared Sampson errors.
-    #[inline]
-    fn sampson_squares(&self, direction: &Vector3<f64>) -> Two {
-        let (e, [tb, tc]) = (dot(&both(direction), &self.normal), self.along);
-        sampson_squares(e, tb, tc)
+    fn new(a: &TwoVectors, b: &TwoVectors, r_21: &[TwoVectors; 3], t: &TwoVectors) -> Self {
+        let c = from_fn(|i| dot(&r_21[i], a));
+        let (normal, along) = (cross(b, &c), [dot(t, b), dot(t, &c)]);
+        let squares = sampson_squares(dot(t, &normal), along[0], along[1]);
+        Self { normal, cosine: dot(b, &c), along, squares }
     }
 }
 
 /// What the matches say of the sign and the length of a translation: sums over those on either side.
 #[derive(Clone, Copy, Default)]
-struct Tally {
-    front: Two,
-    behind: Two,
+struct Tally<T> {
+    front: T,
+    behind: T,
     /// Matches whose rays are not parallel.
-    with_depth: Two,
+    with_depth: T,
     /// Matches whose rays are parallel and point the same way.
-    at_infinity: Two,
+    at_infinity: T,
     /// The sum of the depths, each before its division, and that of their absolute values.
-    signed: Two,
-    absolute: Two,
+    signed: T,
+    absolute: T,
+    /// The sum of the squared Sampson errors.
+    squares: T,
 }
 
-impl Tally {
+impl Tally<Two> {
     #[inline]
-    fn add(&mut self, rays: &Rays, pair: &[Correspondence]) {
+    fn add(&mut self, rays: &Rays, length1: Two, length2: Two) {
         let (cosine, [tb, tc]) = (rays.cosine, rays.along);
         let square = dot(&rays.normal, &rays.normal);
         // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
         let (area1, area2) = (cosine * tb - tc, tb - cosine * tc);
-        let lengths = |of: fn(&Correspondence) -> f64| Two::new([of(&pair[0]), pair.get(1).map_or(1.0, of)]);
-        let (length1, length2) = (lengths(Correspondence::length1), lengths(Correspondence::length2));
         let depths = (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
         let (zero, one) = (Two::ZERO, Two::splat(1.0));
         let is_apart = square.simd_gt(Two::splat(PARALLEL * PARALLEL));
@@ -156,40 +154,49 @@ impl Tally {
         self.at_infinity += !is_apart & cosine.simd_gt(zero) & one;
         self.signed += is_apart & (area1 + area2);
         self.absolute += is_apart & depths;
+        self.squares += rays.squares;
     }
 
+    /// Of both together, or of one of them.
+    #[inline]
+    fn sums(&self, of: impl Fn(Two) -> f64) -> Tally<f64> {
+        Tally {
+            front: of(self.front),
+            behind: of(self.behind),
+            with_depth: of(self.with_depth),
+            at_infinity: of(self.at_infinity),
+            signed: of(self.signed),
+            absolute: of(self.absolute),
+            squares: of(self.squares),
+        }
+    }
+}
+
+impl Tally<f64> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of matches")]
     fn completed(
         &self,
         q_21: UnitQuaternion<f64>,
         direction: &Vector3<f64>,
-        squares: Two,
         matches: &[Correspondence],
     ) -> Completed {
-        let [front, behind, at_infinity] = [self.front, self.behind, self.at_infinity].map(count);
-        let absolute = self.absolute.reduce_add();
-        if absolute == 0.0 {
+        let [front, behind, at_infinity] = [self.front, self.behind, self.at_infinity].map(|x| x as usize);
+        if self.absolute == 0.0 {
             let pose = RelativePose::new(q_21, Vector3::zeros());
             return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
         }
-        let flip = behind > front || (behind == front && self.signed.reduce_add() < 0.0);
-        let length = 2.0 * self.with_depth.reduce_add() / absolute;
+        let flip = behind > front || (behind == front && self.signed < 0.0);
+        let length = 2.0 * self.with_depth / self.absolute;
         let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
-        let residual = (squares.reduce_add() / matches.len() as f64).sqrt();
-        Completed { pose, in_front: at_infinity + if flip { behind } else { front }, residual }
+        let in_front = at_infinity + if flip { behind } else { front };
+        Completed { pose, in_front, residual: (self.squares / matches.len() as f64).sqrt() }
     }
-}
-
-/// The number that two counts make.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of matches")]
-#[inline]
-fn count(both: Two) -> usize {
-    both.reduce_add() as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{SMatrix, Vector4};
+    use nalgebra::{Quaternion, SMatrix, Vector4};
 
     fn planted(t_21: Vector3<f64>) -> (RelativePose, Vec<Correspondence>) {
         let truth = RelativePose::new(UnitQuaternion::new(Vector3::new(0.2, -0.4, 0.1)), t_21);
@@ -220,7 +227,7 @@ mod tests {
         }
         let svd = b.svd(false, true);
         let row = svd.v_t.unwrap().row(svd.singular_values.imin()).clone_owned();
-        std::array::from_fn(|k| row[k])
+        from_fn(|k| row[k])
     }
 
     #[test]

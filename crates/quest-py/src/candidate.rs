@@ -18,7 +18,8 @@ pub(crate) struct Candidate {
     /// str : Where it comes from.
     ///
     /// ``"exact"`` is a real solution of the constraints, ``"from_complex"`` the real part of a complex one,
-    /// ``"rotation_only"`` the rotation that best aligns the bearings.
+    /// ``"rotation_only"`` the rotation that best aligns the bearings, ``"planar"`` a motion of the plane that
+    /// best explains the matches.
     #[pyo3(get)]
     kind: String,
     pose: Pose,

@@ -37,10 +37,9 @@ mod _core {
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
     #[pymodule_export]
-    use crate::third_view::_third_view;
-
-    #[pymodule_export]
     use crate::solve_batch::_solve_batch;
+    #[pymodule_export]
+    use crate::third_view::_third_view;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -2,7 +2,7 @@
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
-use quest_core::solver::{Kinds, SolverName};
+use quest_core::solver::{Kinds, SolverName, UnknownKinds};
 use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence, quaternion};
 
 use crate::arrays::{self, Points};
@@ -22,8 +22,9 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 ///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
 /// solver : str, optional
 ///     One of the names in ``solvers()``; the first of them where absent.
-/// kinds : {"all", "exact"}
-///     Whether to return every candidate, or the real solutions of the constraints alone.
+/// kinds : {"all", "exact", "planar"}
+///     Whether to return every candidate, the real solutions of the constraints alone, or beside every
+///     candidate the motions of a plane, if one explains the matches.
 ///
 /// Returns
 /// -------
@@ -63,7 +64,7 @@ pub(crate) fn solve(
     kinds: &str,
 ) -> PyResult<Vec<Candidate>> {
     let solver = solver_named(solver)?;
-    let kinds = kinds_named(kinds)?;
+    let kinds: Kinds = kinds.parse().map_err(|error: UnknownKinds| QuestError::new_err(error.to_string()))?;
     let views = Views::new(x1, x2, camera1, camera2)?;
     let solved = py.detach(|| {
         let matches = views.matches()?;
@@ -127,14 +128,6 @@ pub(crate) fn _solvers() -> Vec<(&'static str, usize, usize, &'static str)> {
 
 pub(crate) fn solver_named(name: Option<&str>) -> PyResult<SolverName> {
     name.map_or(Ok(SolverName::default()), str::parse).map_err(|error| QuestError::new_err(error.to_string()))
-}
-
-fn kinds_named(name: &str) -> PyResult<Kinds> {
-    match name {
-        "all" => Ok(Kinds::All),
-        "exact" => Ok(Kinds::Exact),
-        _ => Err(QuestError::new_err(format!("kinds is {name:?}, expected \"all\" or \"exact\""))),
-    }
 }
 
 /// Two views of the same points, of the right shapes.

@@ -48,7 +48,7 @@ def test_anything(x1: Any, x2: Any, camera1: Any, camera2: Any) -> None:
         pass
 
 
-@given(views, st.sampled_from([s.name for s in qp.solvers()]), st.sampled_from(["all", "exact"]))
+@given(views, st.sampled_from([s.name for s in qp.solvers()]), st.sampled_from(["all", "exact", "planar"]))
 def test_extreme_numbers(views: Any, solver: str, kinds: Any) -> None:
     x1, x2 = views
     try:

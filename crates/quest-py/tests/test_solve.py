@@ -68,6 +68,19 @@ def test_exact_alone() -> None:
     assert kinds == {"exact", "from_complex", "rotation_only"}
 
 
+def test_planar_comes_closer_on_planes() -> None:
+    errors = {"all": 0.0, "planar": 0.0}
+    for seed in range(20):
+        scene = make_scene(seed, planar=True)
+        x1, x2 = scene.x1.round(3), scene.x2.round(3)
+        every = qp.solve(x1, x2)
+        with_plane = qp.solve(x1, x2, kinds="planar")
+        assert [c for c in with_plane if c.kind != "planar"] == every
+        for kinds, found in ("all", every), ("planar", with_plane):
+            errors[kinds] += min(float(np.linalg.norm(c.R - scene.R)) for c in found)
+    assert errors["planar"] < 0.8 * errors["all"]
+
+
 @pytest.mark.parametrize(
     "cameras",
     [(CAMERA,), (CAMERA, CAMERA), (K,), (K, CAMERA), (K.tolist(), K.astype(np.float32)), (np.asfortranarray(K),)],

@@ -7,6 +7,7 @@
 mod agreement;
 mod bad_input;
 mod candidates;
+mod planes;
 mod planted;
 mod symmetries;
 

@@ -1,10 +1,15 @@
 //! One image of a run, as a row.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    iter,
+};
 
 use quest_core::RelativePose;
 use quest_core::servo::{Estimate, Record};
 use serde::Serialize;
+
+use crate::rows::{self, text};
 
 /// Rotation and translation as files have them.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -83,12 +88,8 @@ impl FrameRecord {
 
 /// A header and a row for each image.
 pub(super) fn write_csv(writer: &mut dyn Write, frames: &[FrameRecord]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
-    csv.write_record(header(frames.first().map_or(0, |f| f.pixels.len())))?;
-    for frame in frames {
-        csv.write_record(frame.row())?;
-    }
-    csv.flush()
+    let header = header(frames.first().map_or(0, |f| f.pixels.len()));
+    rows::write_rows(writer, iter::once(header).chain(frames.iter().map(FrameRecord::row)))
 }
 
 fn header(features: usize) -> Vec<String> {
@@ -108,8 +109,4 @@ fn header(features: usize) -> Vec<String> {
 fn pose(pose: Option<&Pose>) -> [String; 7] {
     let Some(Pose { q_21: [w, x, y, z], t_21: [tx, ty, tz] }) = pose else { return Default::default() };
     [w, x, y, z, tx, ty, tz].map(|&c| text(c))
-}
-
-fn text(x: f64) -> String {
-    if x.is_finite() { format!("{x:?}") } else { String::new() }
 }

@@ -1,6 +1,9 @@
 //! The figures as charts.
 
-use quest_core::simulate::{Figure, Reading};
+use quest_core::{
+    simulate::{Figure, Reading},
+    solver::Kinds,
+};
 use quest_plot::{Axis, Page, Panel, PlotError, Series, Style, colour};
 
 use super::{Record, record::Quantity, run::Run};
@@ -27,8 +30,9 @@ pub(super) fn reading_title(reading: Reading) -> &'static str {
 pub(super) fn conditions(run: &Run, figure: Figure) -> String {
     let scenes = if run.scenes == "paper" { "scenes of the paper's kind" } else { "realistic scenes" };
     let rounded = if run.base.rounded { ", rounded to pixels" } else { "" };
+    let planar = if run.kinds == Kinds::Planar { "; planar candidates beside the others" } else { "" };
     format!(
-        "{} {scenes}{rounded} of {} points at each value, seed {}, the same for every solver.",
+        "{} {scenes}{rounded} of {} points at each value, seed {}, the same for every solver{planar}.",
         run.trials_of(figure),
         run.base.points,
         run.seed

@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use quest_core::{
     simulate::{Figure, SceneOptions},
-    solver::SolverName,
+    solver::{Kinds, SolverName},
 };
 use quest_io::Output;
 
 use self::{record::Record, run::Run};
 use crate::{
     Failure, Outcome,
-    options::{Format, OutputOptions, solver_parser},
+    options::{Format, OutputOptions, kinds_parser, solver_parser},
     rows,
 };
 
@@ -42,7 +42,9 @@ Readings, which compare like with like only within one of them:
   selected  the candidate that 30 further points of the scene choose, without the truth
 
 The same seed gives the same numbers on any number of threads; the times of table 1 are
-measured, on one thread. ± is the 95 % confidence interval of the mean.";
+measured, on one thread. ± is the 95 % confidence interval of the mean. \"ahead of\" counts the
+values at which the errors are smaller than those of the first solver at the same scenes: those
+at which the 95 % confidence interval of the mean difference is below zero.";
 
 /// The experiments of the paper's section 9: errors of the solvers on random scenes, and their times.
 #[derive(Args, Debug)]
@@ -60,6 +62,9 @@ pub(crate) struct Arguments {
     /// These solvers, separated by commas [default: all that need no more points].
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = solver_parser())]
     solvers: Vec<SolverName>,
+    /// Which candidates the readings `all` and `selected` are of.
+    #[arg(long, value_name = "all|planar", default_value = Kinds::default().name(), value_parser = kinds_parser())]
+    kinds: Kinds,
     /// The seed of the scenes.
     #[arg(long, value_name = "S", default_value_t = 2018)]
     seed: u64,
@@ -158,6 +163,7 @@ impl Arguments {
             has_table: is_whole || self.table.is_some(),
             trials: self.trials,
             solvers: self.solvers.clone(),
+            kinds: self.kinds,
             seed: self.seed,
             scenes: match self.scenes {
                 Scenes::Paper => "paper",

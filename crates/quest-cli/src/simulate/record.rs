@@ -5,10 +5,11 @@ use serde::Serialize;
 use super::statistics::Statistics;
 
 /// What is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Quantity {
     /// (61), in radians.
+    #[default]
     RotationRad,
     /// (62), in radians.
     TranslationRad,
@@ -17,7 +18,7 @@ pub(crate) enum Quantity {
 }
 
 /// A row of the result.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Record {
     /// `figure 4`, `table 1`.
     pub(crate) experiment: String,
@@ -37,6 +38,9 @@ pub(crate) struct Record {
     pub(crate) unanswered: usize,
     pub(crate) mean: Option<f64>,
     pub(crate) ci95: Option<f64>,
+    /// The mean of what the errors are more than those of the first solver at the same scenes.
+    pub(crate) difference: Option<f64>,
+    pub(crate) difference_ci95: Option<f64>,
     pub(crate) median: Option<f64>,
     /// Of times, the fastest round: what the machine's other work disturbs least.
     pub(crate) smallest: Option<f64>,
@@ -52,6 +56,15 @@ impl Record {
             ci95: statistics.and_then(|s| s.ci95),
             median: statistics.map(|s| s.median),
             smallest: statistics.map(|s| s.smallest),
+            ..self
+        }
+    }
+
+    /// Fills in the comparison with the first solver.
+    pub(crate) fn beside(self, differences: Option<Statistics>) -> Self {
+        Self {
+            difference: differences.map(|s| s.mean),
+            difference_ci95: differences.and_then(|s| s.ci95),
             ..self
         }
     }

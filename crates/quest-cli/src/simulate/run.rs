@@ -1,14 +1,13 @@
 //! Runs experiments: trials in parallel, their numbers in order.
 
-use indicatif::{ProgressBar, ProgressStyle};
 use quest_core::{
     simulate::{Cell, Figure, PoseErrors, Reading, SceneError, SceneOptions},
-    solver::SolverName,
+    solver::{Kinds, SolverName},
 };
 use rayon::prelude::*;
 
 use super::{Record, record::Quantity, statistics::Statistics, timing};
-use crate::Failure;
+use crate::{Failure, progress::Progress};
 
 /// What is run.
 #[derive(Clone, Debug)]
@@ -19,6 +18,8 @@ pub(crate) struct Run {
     pub(crate) trials: Option<u32>,
     /// The solvers asked for; those of the paper's figure, and ours, if none are.
     pub(crate) solvers: Vec<SolverName>,
+    /// Which candidates they return.
+    pub(crate) kinds: Kinds,
     pub(crate) seed: u64,
     /// The name of the kind of scenes.
     pub(crate) scenes: &'static str,
@@ -58,39 +59,31 @@ impl Run {
     pub(crate) fn execute(&self) -> Result<Vec<Record>, Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
         let pool = pool.map_err(|error| Failure::Arguments(format!("--threads: {error}")))?;
-        let bar = self.progress_bar();
+        let progress = self.progress();
         let mut records = Vec::new();
         for &figure in &self.figures {
-            bar.set_message(format!("figure {}", figure.number()));
-            records.extend(pool.install(|| self.figure(figure, &bar))?);
+            progress.begin(format!("figure {}", figure.number()));
+            records.extend(pool.install(|| self.figure(figure, &progress))?);
         }
         if self.has_table {
-            bar.set_message("table 1");
+            progress.begin("table 1".to_owned());
             records.extend(timing::table(self)?);
         }
-        bar.finish_and_clear();
+        progress.finish();
         Ok(records)
     }
 
-    /// On standard error where it is a terminal, else nowhere.
-    fn progress_bar(&self) -> ProgressBar {
-        if self.is_quiet {
-            return ProgressBar::hidden();
-        }
+    fn progress(&self) -> Progress {
         let cells = |&figure: &Figure| figure.cells(&self.base).len() as u64;
-        let trials: u64 = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
-        let bar = ProgressBar::new(trials);
-        if let Ok(style) = ProgressStyle::with_template("{msg:9} {wide_bar} {pos}/{len} scenes, {eta} left") {
-            bar.set_style(style);
-        }
-        bar
+        let scenes = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
+        Progress::new("scenes", Some(scenes), self.is_quiet)
     }
 
-    fn figure(&self, figure: Figure, bar: &ProgressBar) -> Result<Vec<Record>, SceneError> {
+    fn figure(&self, figure: Figure, progress: &Progress) -> Result<Vec<Record>, SceneError> {
         let solvers = self.solvers_of(figure);
         let cells = figure.cells(&self.base);
         let of_cell = |cell: &Cell| {
-            let trials = self.trials(cell, figure, &solvers, bar)?;
+            let trials = self.trials(cell, figure, &solvers, progress)?;
             Ok(self.records(figure, cell, &solvers, &trials))
         };
         // Collected in the order of the cells, whatever thread was faster.
@@ -103,12 +96,12 @@ impl Run {
         cell: &Cell,
         figure: Figure,
         solvers: &[SolverName],
-        bar: &ProgressBar,
+        progress: &Progress,
     ) -> Result<Vec<Trial>, SceneError> {
         let trial = |index: u32| {
             let problem = cell.problem(self.seed, index)?;
-            bar.inc(1);
-            Ok(solvers.iter().map(|&solver| problem.judge(solver)).collect())
+            progress.add(1);
+            Ok(solvers.iter().map(|&solver| problem.judge(solver, self.kinds)).collect())
         };
         (0..self.trials_of(figure)).into_par_iter().map(trial).collect()
     }
@@ -120,6 +113,8 @@ impl Run {
                 let answers: Vec<PoseErrors> = trials.iter().filter_map(|trial| trial[s][r]).collect();
                 let record = |quantity, error: fn(&PoseErrors) -> f64| {
                     let values: Vec<f64> = answers.iter().map(error).collect();
+                    let beside = |trial: &Trial| Some(error(&trial[s][r]?) - error(&trial[0][r]?));
+                    let differences: Vec<f64> = trials.iter().filter_map(beside).collect();
                     let record = Record {
                         experiment: format!("figure {}", figure.number()),
                         scenes: self.scenes,
@@ -130,13 +125,10 @@ impl Run {
                         quantity,
                         trials: trials.len(),
                         unanswered: trials.len() - answers.len(),
-                        mean: None,
-                        ci95: None,
-                        median: None,
-                        smallest: None,
-                        paper: None,
+                        ..Record::default()
                     };
-                    record.with(Statistics::of(&values))
+                    let differences = Statistics::of(&differences).filter(|_| s > 0);
+                    record.with(Statistics::of(&values)).beside(differences)
                 };
                 records.push(record(Quantity::RotationRad, |e| e.rotation));
                 // There is no translation to be found in a rotation.

@@ -38,7 +38,7 @@ fn of_figure(run: &Run, figure: Figure, records: &[Record]) -> String {
     text
 }
 
-/// One row a solver: the mean at some values, and how often it is the lowest.
+/// One row a solver: the mean at some values, how often it is the lowest, and how often it beats the first solver.
 fn errors(run: &Run, figure: Figure, records: &[&Record]) -> String {
     let cells = figure.cells(&run.base);
     let last = cells.last().map_or(0.0, |cell| cell.x);
@@ -46,9 +46,11 @@ fn errors(run: &Run, figure: Figure, records: &[&Record]) -> String {
     // 0.01, not 0.010000000000000002.
     let header = |part: f64| format!("{}{unit}", (1e6 * part * last).round() / 1e6);
     let [a, b, c, d, e] = SHOWN.map(header);
+    let solvers = run.solvers_of(figure);
+    let ahead = format!("ahead of\n{}", solvers[0].info().name);
     let mut table: Table =
-        table::empty(["solver", &a, &b, &c, &d, &e, "lowest\nor within 2 %", "no\ncandidate"]);
-    for solver in run.solvers_of(figure) {
+        table::empty(["solver", &a, &b, &c, &d, &e, "lowest\nor within 2 %", &ahead, "no\ncandidate"]);
+    for (k, solver) in solvers.into_iter().enumerate() {
         let name = solver.info().name;
         let own: Vec<&&Record> = records.iter().filter(|r| r.solver == name).collect();
         let mut row = vec![Cell::new(name)];
@@ -58,6 +60,8 @@ fn errors(run: &Run, figure: Figure, records: &[&Record]) -> String {
         }
         let lowest = own.iter().filter(|r| is_lowest(r, records)).count();
         row.push(table::right(format!("{lowest} of {}", own.len())));
+        let ahead = own.iter().filter(|r| is_ahead(r)).count();
+        row.push(table::right(if k == 0 { String::new() } else { ahead.to_string() }));
         row.push(table::right(own.iter().map(|r| r.unanswered).sum::<usize>()));
         table.add_row(row);
     }
@@ -79,6 +83,12 @@ fn is_lowest(record: &Record, records: &[&Record]) -> bool {
     let rivals = records.iter().filter(|r| r.value.total_cmp(&record.value).is_eq());
     let lowest = rivals.filter_map(|r| r.mean).fold(f64::INFINITY, f64::min);
     mean <= (NEARLY * lowest).max(ROUNDING)
+}
+
+/// Whether the errors are smaller than those of the first solver at the same scenes by more than chance explains.
+fn is_ahead(record: &Record) -> bool {
+    let bounds = record.difference.zip(record.difference_ci95);
+    bounds.is_some_and(|(difference, ci95)| difference + ci95 < -ROUNDING)
 }
 
 fn of_table(records: &[Record]) -> String {

@@ -104,15 +104,11 @@ fn record(run: &Run, row: &Row) -> Record {
         varied: "points",
         value: row.points as f64,
         solver: name,
-        reading: if row.kinds == Kinds::Exact { "exact" } else { "all" },
+        reading: row.kinds.name(),
         quantity: Quantity::TimeMs,
         trials: row.rounds_ms.len(),
-        unanswered: 0,
-        mean: None,
-        ci95: None,
-        median: None,
-        smallest: None,
         paper: paper.map(|(.., ms)| *ms),
+        ..Record::default()
     };
     record.with(Statistics::of(&row.rounds_ms))
 }

@@ -120,6 +120,24 @@ fn kinds_exact_leaves_the_other_kinds_out() {
 }
 
 #[test]
+fn kinds_planar_adds_the_motions_of_a_plane() {
+    // Points on the plane z = 4 + 0.3 x - 0.2 y, rounded.
+    let plane = json!([
+        [0.054, 0.116, -0.254, 0.158],
+        [0.21, 0.153, -0.114, 0.145],
+        [0.162, -0.212, -0.228, -0.143],
+        [-0.177, 0.198, -0.436, 0.288],
+        [-0.102, -0.04, -0.425, 0.075]
+    ]);
+    let planar = |kinds: &str| {
+        let run = solve_matches(&plane, &["--kinds", kinds, "--format", "csv"]);
+        run.stdout.lines().filter(|line| line.contains(",planar,")).count()
+    };
+    // Of four motions two have the points in front.
+    assert_eq!(["exact", "all", "planar"].map(planar), [0, 0, 2]);
+}
+
+#[test]
 fn matches_without_a_pose() {
     for options in [&[][..], &["--format", "json", "--quiet"], &["--all"]] {
         let run = solve_matches(&coincident(), options);

@@ -139,3 +139,16 @@ fn a_reader_that_leaves_is_no_error() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
 }
+
+#[test]
+fn a_reader_that_leaves_a_long_table_is_no_error() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_quest-cli"))
+        .args(["simulate", "--figure", "4", "--trials", "1", "--solvers", "quest", "--format", "csv"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+}

@@ -32,5 +32,5 @@ fn console_examples_are_true() {
             examples += 1;
         }
     }
-    assert_eq!(examples, 3);
+    assert_eq!(examples, 5);
 }

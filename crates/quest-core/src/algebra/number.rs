@@ -1,4 +1,4 @@
-//! What the solutions are computed with: real numbers, complex ones, and two real ones side by side.
+//! What the solutions are computed with: real and complex numbers, and two of either side by side.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -25,6 +25,18 @@ pub(crate) trait Number:
 
     /// The longer of two vectors.
     fn longer<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N];
+}
+
+/// A number with an imaginary part.
+pub(crate) trait ComplexNumber: Number {
+    /// What its parts are.
+    type Part: Number;
+
+    /// The real part.
+    fn re(self) -> Self::Part;
+
+    /// With the other sign of the imaginary part.
+    fn conjugate(self) -> Self;
 }
 
 impl Number for f64 {
@@ -73,6 +85,20 @@ impl Number for Complex<f64> {
     }
 }
 
+impl ComplexNumber for Complex<f64> {
+    type Part = f64;
+
+    #[inline]
+    fn re(self) -> f64 {
+        self.re
+    }
+
+    #[inline]
+    fn conjugate(self) -> Self {
+        self.conj()
+    }
+}
+
 impl Number for Two {
     #[inline]
     fn real(x: f64) -> Self {
@@ -92,6 +118,118 @@ impl Number for Two {
     }
 }
 
+/// Two complex numbers side by side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TwoComplex {
+    re: Two,
+    im: Two,
+}
+
+impl TwoComplex {
+    #[inline]
+    pub(crate) fn new(z: [Complex<f64>; 2]) -> Self {
+        Self { re: Two::new(z.map(|z| z.re)), im: Two::new(z.map(|z| z.im)) }
+    }
+
+    #[inline]
+    pub(crate) fn to_array(self) -> [Complex<f64>; 2] {
+        let (re, im) = (self.re.to_array(), self.im.to_array());
+        [Complex::new(re[0], im[0]), Complex::new(re[1], im[1])]
+    }
+
+    #[inline]
+    fn square_norm(self) -> Two {
+        self.re * self.re + self.im * self.im
+    }
+}
+
+impl Add for TwoComplex {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, z: Self) -> Self {
+        Self { re: self.re + z.re, im: self.im + z.im }
+    }
+}
+
+impl Sub for TwoComplex {
+    type Output = Self;
+
+    #[inline]
+    fn sub(self, z: Self) -> Self {
+        Self { re: self.re - z.re, im: self.im - z.im }
+    }
+}
+
+impl Mul for TwoComplex {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, z: Self) -> Self {
+        Self { re: self.re * z.re - self.im * z.im, im: self.re * z.im + self.im * z.re }
+    }
+}
+
+impl Div for TwoComplex {
+    type Output = Self;
+
+    #[inline]
+    fn div(self, z: Self) -> Self {
+        let Self { re, im } = self * z.conjugate();
+        let inverse = Two::splat(1.0) / z.square_norm();
+        Self { re: re * inverse, im: im * inverse }
+    }
+}
+
+impl Number for TwoComplex {
+    #[inline]
+    fn real(x: f64) -> Self {
+        Self { re: Two::splat(x), im: Two::ZERO }
+    }
+
+    #[inline]
+    fn times(self, x: f64) -> Self {
+        Self { re: self.re * x, im: self.im * x }
+    }
+
+    #[inline]
+    fn square_root(self) -> Self {
+        let half = ((self.square_norm().sqrt() + self.re.abs()) * 0.5).sqrt();
+        let other = self.im * 0.5 / half;
+        let is_right = self.re.simd_ge(Two::ZERO);
+        let signed = self.im.simd_lt(Two::ZERO).select(-half, half);
+        let is_zero = half.simd_eq(Two::ZERO);
+        Self {
+            re: is_zero.select(half, is_right.select(half, other.abs())),
+            im: is_zero.select(half, is_right.select(other, signed)),
+        }
+    }
+
+    #[inline]
+    fn longer<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
+        let square = |v: &[Self; N]| v.iter().fold(Two::ZERO, |sum, x| sum + x.square_norm());
+        let is_longer = square(y).simd_gt(square(x));
+        std::array::from_fn(|k| Self {
+            re: is_longer.select(y[k].re, x[k].re),
+            im: is_longer.select(y[k].im, x[k].im),
+        })
+    }
+}
+
+impl ComplexNumber for TwoComplex {
+    type Part = Two;
+
+    #[inline]
+    fn re(self) -> Two {
+        self.re
+    }
+
+    #[inline]
+    fn conjugate(self) -> Self {
+        Self { im: -self.im, ..self }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,10 +239,29 @@ mod tests {
         for re in [-2.0, -1e-9, 0.0, 0.3, 4.0] {
             for im in [-3.0, -1e-12, 0.0, 1e-5, 2.0] {
                 let z = Complex::new(re, im);
+                let two = TwoComplex::new([z, -z]).square_root().to_array();
                 assert!((z.square_root() - z.sqrt()).norm() < 1e-15 * (1.0 + z.norm()), "{z}");
+                assert_eq!(two, [z, -z].map(Number::square_root));
             }
         }
         assert!((2.25_f64.square_root() - 1.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn two_complex_numbers_are_as_one_and_one() {
+        let (x, y) = ([Complex::new(0.3, -2.0), Complex::i()], [Complex::new(-1.5, 0.4), Complex::from(2.0)]);
+        let (two_x, two_y) = (TwoComplex::new(x), TwoComplex::new(y));
+        for (two, one) in [
+            (two_x + two_y, [x[0] + y[0], x[1] + y[1]]),
+            (two_x - two_y, [x[0] - y[0], x[1] - y[1]]),
+            (two_x * two_y, [x[0] * y[0], x[1] * y[1]]),
+            (two_x / two_y, [x[0] / y[0], x[1] / y[1]]),
+            (two_x.times(3.0) + TwoComplex::real(1.0), x.map(|x| x * 3.0 + 1.0)),
+            (two_x.conjugate(), x.map(|x| x.conj())),
+            (TwoComplex::longer(&[two_x], &[two_y])[0], [x[0], y[1]]),
+        ] {
+            assert!(two.to_array().iter().zip(one).all(|(two, one)| (two - one).norm() < 1e-15));
+        }
     }
 
     #[test]

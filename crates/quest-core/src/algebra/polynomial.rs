@@ -1,13 +1,14 @@
 //! The roots of a real polynomial of small fixed degree.
 //!
 //! Real roots by Sturm's theorem: the sign changes of a chain of polynomials count the roots in an interval, bisection
-//! isolates them, and a safeguarded Newton iteration refines each. Complex roots by Laguerre's method on what is left.
+//! isolates them, and a safeguarded Newton iteration refines each. Complex roots of what is left: by Laguerre's method, the last four
+//! in closed form.
 //!
 //! Coefficients stand from the constant up; a polynomial of degree `D` has `N = D + 1` of them.
 
 use nalgebra::Complex;
 
-use super::number::Number;
+use super::number::{Number, TwoComplex};
 use super::two::Two;
 
 /// Where trisection gives up on telling two roots apart: at a third of a third of an interval, and so on.
@@ -360,17 +361,26 @@ pub(crate) fn complex_roots<const N: usize>(
         degree -= 1;
     }
     let mut found = 0;
-    while degree >= 2 {
-        let coefficients = &rest[..=degree];
-        let root = if degree == 2 { quadratic_root(coefficients) } else { laguerre(coefficients) };
-        let Some(root) = root else { break };
+    while let Some(root) = laguerre(&rest, degree) {
         divide_quadratic(&mut rest, degree, 2.0 * root.re, root.norm_sqr());
         degree -= 2;
-        let polished = newton_step(p, root);
-        let polished = if polished.re.is_finite() && polished.im.is_finite() { polished } else { root };
-        // A double root, or two real ones that the chain did not tell apart, comes out with next to no imaginary part.
-        out[found] = Complex::new(polished.re, polished.im.abs());
+        out[found] = root;
         found += 1;
+    }
+    if degree == 4 {
+        [out[found], out[found + 1]] = quartic_roots(&rest);
+        found += 2;
+    } else if degree == 2 {
+        out[found] = quadratic_root(0.5 * rest[1] / rest[2], rest[0] / rest[2]);
+        found += 1;
+    }
+    for roots in out[..found].chunks_mut(2) {
+        let steps = newton_step(p, TwoComplex::new([roots[0], roots[roots.len() - 1]])).to_array();
+        for (root, step) in roots.iter_mut().zip(steps) {
+            let polished = if step.re.is_finite() && step.im.is_finite() { *root - step } else { *root };
+            // A double root, or two real ones that the chain did not tell apart, comes out with next to no imaginary part.
+            *root = Complex::new(polished.re, polished.im.abs());
+        }
     }
     found
 }
@@ -383,9 +393,9 @@ fn divide_linear<const N: usize>(p: &mut [f64; N], degree: usize, root: f64) {
             (*c, carry) = (carry, *c + root * carry);
         }
     } else {
-        let mut carry = 0.0;
+        let (mut carry, inverse) = (0.0, 1.0 / root);
         for c in &mut p[..degree] {
-            carry = (carry - *c) / root;
+            carry = (carry - *c) * inverse;
             *c = carry;
         }
     }
@@ -402,54 +412,100 @@ fn divide_quadratic<const N: usize>(p: &mut [f64; N], degree: usize, sum: f64, p
     p.copy_within(2..=degree, 0);
 }
 
-/// The root with positive imaginary part of a quadratic; a double real root where rounding left a real pair.
-fn quadratic_root(p: &[f64]) -> Option<Complex<f64>> {
-    let half = -0.5 * p[1] / p[2];
-    let square = p[0] / p[2] - half * half;
-    let root = Complex::new(half, square.max(0.0).sqrt());
-    (root.re.is_finite() && root.im.is_finite()).then_some(root)
+/// The root of `x² + 2 half x + constant` with the positive imaginary part; a double real root where rounding left a real pair.
+#[inline]
+fn quadratic_root(half: f64, constant: f64) -> Complex<f64> {
+    Complex::new(-half, (constant - half * half).max(0.0).sqrt())
 }
 
-/// Laguerre's iteration to a root of a polynomial that has no real ones.
-fn laguerre(p: &[f64]) -> Option<Complex<f64>> {
-    let degree = (p.len() - 1) as f64;
+/// One of each pair of roots of a quartic without real ones (Descartes): with `y = x + h` to leave no cube,
+///
+/// ```text
+/// y⁴ + p y² + q y + r = (y² + α y + β) (y² − α y + γ),   u = α²
+/// u³ + 2 p u² + (p² − 4 r) u − q² = 0,   β + γ = p + u,   β γ = r,   α (γ − β) = q
+/// ```
+///
+/// The cubic has one positive root, and two that are not: the squares of sums of roots that are not conjugate.
+fn quartic_roots<const N: usize>(coefficients: &[f64; N]) -> [Complex<f64>; 2] {
+    let inverse = 1.0 / coefficients[4];
+    let [e, d, c, b] = [0, 1, 2, 3].map(|k| coefficients[k] * inverse);
+    let h = 0.25 * b;
+    let p = c - 6.0 * h * h;
+    let q = d - 2.0 * h * (c - 4.0 * h * h);
+    let r = e - h * d + h * h * (c - 3.0 * h * h);
+    let (second, first, last) = (2.0 * p, p * p - 4.0 * r, q * q);
+    // No root of a cubic with real roots is above this. From there Halley's iteration falls to the largest.
+    let mut u = (2.0 * (second * second - 3.0 * first).max(0.0).sqrt() - second) / 3.0;
+    for _ in 0..MAX_STEPS {
+        let f = ((u + second) * u + first) * u - last;
+        let slope = (3.0 * u + 2.0 * second) * u + first;
+        let step = f * slope / (slope * slope - f * (3.0 * u + second));
+        if step > 0.0 {
+            u -= step;
+        }
+        if step.is_nan() || step <= 1e-4 * u {
+            break;
+        }
+    }
+    let sum = p + u;
+    let difference = (sum * sum - 4.0 * r).max(0.0).sqrt().copysign(q);
+    let half = 0.5 * u.max(0.0).sqrt();
+    [quadratic_root(half, 0.5 * (sum - difference)) - h, quadratic_root(-half, 0.5 * (sum + difference)) - h]
+}
+
+/// A root of the first coefficients, up to an even `degree` of six or more, of a polynomial that has no real ones.
+fn laguerre<const N: usize>(p: &[f64; N], degree: usize) -> Option<Complex<f64>> {
+    // As many steps of Horner's rule as the compiler knows of.
+    match degree {
+        6 => complex_root::<7>(p.first_chunk()?),
+        8 => complex_root::<9>(p.first_chunk()?),
+        10 => complex_root::<11>(p.first_chunk()?),
+        _ => None,
+    }
+}
+
+/// Two steps of Laguerre's iteration, which finds the way from anywhere, then Halley's, which does without a square root.
+fn complex_root<const N: usize>(p: &[f64; N]) -> Option<Complex<f64>> {
+    let degree = (N - 1) as f64;
     let mut z = Complex::new(0.0, 1.0);
-    for _ in 0..40 {
-        let (mut f, mut d, mut h) = (Complex::from(p[p.len() - 1]), Complex::from(0.0), Complex::from(0.0));
-        for c in p[..p.len() - 1].iter().rev() {
+    for count in 0..40 {
+        // The value, the slope, and half of the curvature.
+        let (mut f, mut d, mut h) = (Complex::from(p[N - 1]), Complex::from(0.0), Complex::from(0.0));
+        for c in p[..N - 1].iter().rev() {
             h = h * z + d;
             d = d * z + f;
             f = f * z + c;
         }
-        if f.norm_sqr() == 0.0 {
-            return Some(z);
-        }
-        let g = d / f;
-        let g2 = g * g;
-        let curvature = g2 - 2.0 * h / f;
-        let root = ((degree * curvature - g2) * (degree - 1.0)).square_root();
-        let (plus, minus) = (g + root, g - root);
-        let denominator = if plus.norm_sqr() > minus.norm_sqr() { plus } else { minus };
-        let step = degree / denominator;
+        let (numerator, denominator) = if count < 2 {
+            let square = (d * d * (degree - 1.0) - f * h * (2.0 * degree)) * (degree - 1.0);
+            let root = square.square_root();
+            let is_longer = d.re * root.re + d.im * root.im >= 0.0;
+            (f * degree, if is_longer { d + root } else { d - root })
+        } else {
+            (f * d, d * d - f * h)
+        };
+        let step = numerator * denominator.conj() * (1.0 / denominator.norm_sqr());
         if !(step.re.is_finite() && step.im.is_finite()) {
-            return None;
+            return (f.norm_sqr() == 0.0).then_some(z);
         }
         z -= step;
-        // Cubic convergence, and Newton's steps on the whole polynomial follow.
-        if step.norm_sqr() <= 1e-14 * z.norm_sqr() {
+        // The convergence is cubic, and a step on the whole polynomial follows.
+        if step.norm_sqr() <= 1e-8 * z.norm_sqr() {
             return Some(z);
         }
     }
     None
 }
 
-fn newton_step<const N: usize>(p: &[f64; N], z: Complex<f64>) -> Complex<f64> {
-    let (mut value, mut slope) = (Complex::from(p[N - 1]), Complex::from(0.0));
+/// By how much two roots of `p` are off, to first order.
+#[inline]
+fn newton_step<const N: usize>(p: &[f64; N], z: TwoComplex) -> TwoComplex {
+    let (mut value, mut slope) = (TwoComplex::real(p[N - 1]), TwoComplex::real(0.0));
     for c in p[..N - 1].iter().rev() {
         slope = slope * z + value;
-        value = value * z + c;
+        value = value * z + TwoComplex::real(*c);
     }
-    z - value / slope
+    value / slope
 }
 
 #[cfg(test)]

@@ -5,6 +5,9 @@
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
+use super::number::Number;
+use super::two::{Two, TwoVectors, cross, dot};
+
 /// Enough for a double root, where the convergence is linear.
 const MAX_STEPS: usize = 60;
 
@@ -33,23 +36,38 @@ fn smallest_root(below: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
 ///
 /// One of its eigenvectors where the eigenvalue is multiple; `None` where no direction is left of the matrix.
 pub(crate) fn smallest_eigenvector_3(m: &Matrix3<f64>) -> Option<Vector3<f64>> {
-    let scale = m.trace();
-    if scale <= 0.0 || !scale.is_finite() {
-        return None;
-    }
-    let m = m / scale;
-    let (x, y, z) = (m[(0, 0)], m[(1, 1)], m[(2, 2)]);
-    let (xy, xz, yz) = (m[(0, 1)], m[(0, 2)], m[(1, 2)]);
-    // λ³ − λ² + second λ − determinant, the trace being one.
+    let entries = [m[(0, 0)], m[(1, 1)], m[(2, 2)], m[(0, 1)], m[(0, 2)], m[(1, 2)]];
+    let vector = Vector3::from(smallest_eigenvectors_3(&entries.map(Two::splat)).map(|x| x.to_array()[0]));
+    vector.sum().is_finite().then_some(vector)
+}
+
+/// The same of two matrices side by side, of each `[xx, yy, zz, xy, xz, yz]`; not finite where there is none.
+#[inline]
+pub(crate) fn smallest_eigenvectors_3(m: &[Two; 6]) -> TwoVectors {
+    let one = Two::splat(1.0);
+    let scale = one / (m[0] + m[1] + m[2]);
+    let [x, y, z, xy, xz, yz] = m.map(|entry| entry * scale);
+    // λ³ − λ² + second λ − determinant, the trace being one; Halley's iteration rises to its smallest root as Newton's does.
     let second = x * y + x * z + y * z - xy * xy - xz * xz - yz * yz;
     let determinant = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz);
-    let value =
-        smallest_root(0.0, |l| (((l - 1.0) * l + second) * l - determinant, (3.0 * l - 2.0) * l + second));
-    let rows =
-        [Vector3::new(x - value, xy, xz), Vector3::new(xy, y - value, yz), Vector3::new(xz, yz, z - value)];
-    let columns = [rows[1].cross(&rows[2]), rows[2].cross(&rows[0]), rows[0].cross(&rows[1])];
-    let longest = longest(&columns.map(|c| c.norm_squared()))?;
-    Some(columns[longest].normalize())
+    let (mut value, mut is_over) = (Two::ZERO, Two::ZERO);
+    for _ in 0..MAX_STEPS {
+        let f = ((value - one) * value + second) * value - determinant;
+        let slope = (value * 3.0 - Two::splat(2.0)) * value + second;
+        let step = f * slope / (slope * slope - f * (value * 3.0 - one));
+        // At the root rounding turns the step round, or leaves no slope.
+        is_over |= !(step.simd_lt(Two::ZERO) & step.simd_gt(-one));
+        value = is_over.select(value, value - step);
+        is_over |= (-step).simd_le(value * 1e-8);
+        if is_over.all() {
+            break;
+        }
+    }
+    let rows = [[x - value, xy, xz], [xy, y - value, yz], [xz, yz, z - value]];
+    let two_of = Two::longer(&cross(&rows[1], &rows[2]), &cross(&rows[2], &rows[0]));
+    let longest = Two::longer(&two_of, &cross(&rows[0], &rows[1]));
+    let inverse = one / dot(&longest, &longest).sqrt();
+    longest.map(|x| x * inverse)
 }
 
 /// The unit eigenvector of a symmetric matrix without trace whose eigenvalues are at least `below`, for its

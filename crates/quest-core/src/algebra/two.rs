@@ -9,6 +9,9 @@ pub(crate) use wide::f64x2 as Two;
 /// Two vectors.
 pub(crate) type TwoVectors = [Two; 3];
 
+/// Two quaternions, scalar first.
+pub(crate) type TwoQuaternions = [Two; 4];
+
 /// Two vectors side by side; the second is zero where there is none.
 #[inline]
 pub(crate) fn side_by_side(first: &Vector3<f64>, second: Option<&Vector3<f64>>) -> TwoVectors {
@@ -38,6 +41,21 @@ pub(crate) fn dot(x: &TwoVectors, y: &TwoVectors) -> Two {
 #[inline]
 pub(crate) fn times(m: &Matrix3<f64>, v: &TwoVectors) -> TwoVectors {
     from_fn(|i| Two::splat(m[(i, 0)]) * v[0] + Two::splat(m[(i, 1)]) * v[1] + Two::splat(m[(i, 2)]) * v[2])
+}
+
+/// The rotation matrices of unit quaternions, row by row.
+#[inline]
+pub(crate) fn rotation(q: &TwoQuaternions) -> [TwoVectors; 3] {
+    let [w, x, y, z] = *q;
+    let (x2, y2, z2, one) = (x + x, y + y, z + z, Two::splat(1.0));
+    let (xx, yy, zz) = (x * x2, y * y2, z * z2);
+    let (xy, xz, yz) = (x * y2, x * z2, y * z2);
+    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+    [
+        [one - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, one - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, one - (xx + yy)],
+    ]
 }
 
 #[cfg(test)]

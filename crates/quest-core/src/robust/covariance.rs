@@ -1,61 +1,58 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
-//! It is `1.02 σ² H⁻¹ + 1.40 H⁻¹ S H⁻¹` with `H = Σ J Jᵀ` over the inliers, `σ` the noise that they show and the factors those
-//! of the last refinement's loss. `S` is what false matches that happen to agree with the pose pull at it: as many as there are
-//! outliers are expected to have `S = Σ ψ² J Jᵀ`, which is measured on false matches (see
-//! [`significance`](super::significance)).
+//! It is `(E[ψ²] H⁻¹ + H⁻¹ S H⁻¹) / E[ψ']²` with `H = Σ J Jᵀ` over the inliers and `ψ` the influence of a residual under the
+//! last refinement's loss, the means being those of normal noise as large as the inliers show. `S` is what false matches
+//! that happen to agree with the pose pull at it: as many as there are outliers are expected to have `S = Σ ψ² J Jᵀ`, which is
+//! measured on false matches (see [`significance`](super::significance)). For few inliers there is a factor close to one
+//! (P. J. Huber, *Robust statistics*, 1981, section 7.6).
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
 
 use super::length::{Length, length};
-use super::loss::{Biweight, SquaredInfluence, Truncated};
+use super::loss::{SquaredInfluence, Truncated};
 use super::observations::Observations;
-use super::polish::WIDTH;
+use super::polish::Polished;
 use super::pose_score::PoseScorer;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::Motion;
 
-/// The loss of efficiency of the last refinement's loss: E[ψ²] / E[ψ']² of a normal variable, with a biweight of six standard
-/// deviations.
-const EFFICIENCY: f64 = 1.02;
-
-/// `1 / E[ψ']²` of the same.
-const PULL: f64 = 1.40;
-
 /// Steps of the numerical derivatives of the length, in radians.
 const STEP: f64 = 1e-5;
 
 /// Matches that the derivatives of the length are taken over.
-const ENOUGH: usize = 200;
+const ENOUGH: usize = 100;
 
-/// The covariance of the five parameters of a motion, `sigma` the noise in pixels.
+/// The covariance of the five parameters of a motion.
 fn of_motion(
     observations: &Observations,
     motion: &Motion,
     inliers: &[u32],
-    sigma: f64,
+    polished: &Polished,
     false_matches: &[Observations],
 ) -> Option<Matrix5<f64>> {
     let subset = Subset::new(observations, inliers);
     let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));
     let inverse = equations.hessian.cholesky()?.inverse();
     let outliers = (observations.len() - inliers.len()) as f64;
-    let pull = pull_of_a_match(false_matches, motion, WIDTH * sigma) * outliers;
-    Some(inverse * (EFFICIENCY * sigma * sigma) + inverse * pull * inverse * PULL)
+    let pull = pull_of_a_match(false_matches, motion, polished) * outliers;
+    let normal = polished.loss.of_normal(polished.sigma);
+    let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
+    let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
+    Some((inverse * normal.square + inverse * pull * inverse) * (few * few))
 }
 
 /// The mean of `ψ² J Jᵀ` over false matches, most of which are too far off to count.
-fn pull_of_a_match(false_matches: &[Observations], motion: &Motion, limit: f64) -> Matrix5<f64> {
+fn pull_of_a_match(false_matches: &[Observations], motion: &Motion, polished: &Polished) -> Matrix5<f64> {
     let mut pull = Matrix5::zeros();
     let mut all = 0_usize;
     for some in false_matches {
-        let mut poses = PoseScorer::new(some, limit);
-        poses.score(*motion, limit);
+        let mut poses = PoseScorer::new(some, polished.limit);
+        poses.score(*motion, polished.limit);
         let subset = Subset::new(some, &poses.inliers);
-        pull += subset.equations(some, motion, &SquaredInfluence(Biweight::new(limit))).hessian;
+        pull += subset.equations(some, motion, &SquaredInfluence(polished.loss)).hessian;
         all += some.len();
     }
     pull / all.max(1) as f64
@@ -66,11 +63,11 @@ pub(super) fn of_pose(
     observations: &Observations,
     motion: &Motion,
     inliers: &[u32],
-    sigma: f64,
+    polished: &Polished,
     size: Length,
     false_matches: &[Observations],
 ) -> Option<Matrix6<f64>> {
-    let five = of_motion(observations, motion, inliers, sigma, false_matches)?;
+    let five = of_motion(observations, motion, inliers, polished, false_matches)?;
     let tangent = tangent_basis(&motion.direction);
     // The derivatives of the length hardly need all of the matches.
     let some = &inliers[..inliers.len().min(ENOUGH)];
@@ -78,7 +75,7 @@ pub(super) fn of_pose(
         let at = |step: f64| {
             let mut steps = [0.0; 5];
             steps[k] = step;
-            length(observations, &motion.stepped(&tangent, &steps), some, sigma).value
+            length(observations, &motion.stepped(&tangent, &steps), some, polished.sigma).value
         };
         (at(STEP) - at(-STEP)) / (2.0 * STEP)
     });

@@ -39,6 +39,9 @@ const LEAST_NOISE: f64 = 0.3;
 /// More matches than this are not looked at.
 const ENOUGH: usize = 300;
 
+/// A rotation whose mean capped error over some of the matches is above this is not refined over all of them: it is not enough.
+const HOPELESS: f64 = 7.0;
+
 /// Matches over which the two starts of the rotation are compared.
 const FITTED: usize = 60;
 
@@ -112,7 +115,11 @@ fn rotation_alone(
         (q, cost)
     });
     let mut q = if starts[1].1 < starts[0].1 { starts[1].0 } else { starts[0].0 };
-    refine_rotation(framed, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
+    let r_21 = q.to_rotation_matrix().into_inner();
+    let squares = some.iter().map(|m| (square_error(&r_21, m) / (sigma * sigma)).min(CAP));
+    if squares.sum::<f64>() < HOPELESS * some.len() as f64 {
+        refine_rotation(framed, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
+    }
     q
 }
 

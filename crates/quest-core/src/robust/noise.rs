@@ -21,6 +21,10 @@ const USUAL: f64 = 1.0 / 3.0;
 const USUAL_COUNT: f64 = 4.0;
 const FORGOTTEN: f64 = 10.0;
 
+/// The noise of sharp images, as a share of the threshold, and as how many residuals it counts where a loss is scaled.
+const EXPECTED: f64 = 0.22;
+const EXPECTED_COUNT: f64 = 60.0;
+
 /// The standard deviation of the Sampson errors of inliers within `threshold`: by the median first, then by the variance of
 /// what that leaves, corrected for the cut and for the five parameters that were fitted.
 pub(super) fn estimate(residuals: impl Iterator<Item = f64>, threshold: f64) -> f64 {
@@ -49,6 +53,16 @@ pub(super) fn estimate(residuals: impl Iterator<Item = f64>, threshold: f64) -> 
     sigma
 }
 
+/// The noise that a loss is scaled by, when so many inliers within `threshold` show the noise `sigma`: of few residuals the
+/// smallest and the largest scale fit as well, and what is usual decides (the mean of a variance whose prior is the inverse
+/// χ² distribution).
+pub(super) fn prudent(sigma: f64, inliers: usize, threshold: f64) -> f64 {
+    let free = (inliers as f64 - PARAMETERS).max(0.0);
+    let expected = EXPECTED * threshold;
+    let sum = EXPECTED_COUNT * expected * expected + free * sigma * sigma;
+    (sum / (EXPECTED_COUNT + free)).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,6 +80,14 @@ mod tests {
             // 20,000 values scatter by half a percent; the rule's own constant is good to one.
             assert!((found / sigma - 1.0).abs() < 0.03, "{found}");
         }
+    }
+
+    #[test]
+    fn prudence_yields_to_evidence() {
+        assert!((prudent(0.5, 5, 1.0) - 0.22).abs() < 1e-12);
+        let half_way = (0.5_f64 * (0.22 * 0.22 + 0.25)).sqrt();
+        assert!((prudent(0.5, 65, 1.0) - half_way).abs() < 1e-12);
+        assert!((prudent(0.5, 100_000, 1.0) / 0.5 - 1.0).abs() < 1e-3);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The last refinement of a pose: over all of its inliers, with the noise that they show.
 
-use super::loss::{Biweight, Truncated};
+use super::loss::{HeavyTailed, Truncated};
 use super::noise;
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{Subset, refine};
@@ -12,9 +12,8 @@ const STEPS: usize = 15;
 /// Inliers, at most, that the first of them looks at: it is where the second begins.
 const ENOUGH: usize = 5_000;
 
-/// Where the last loss levels off, in standard deviations of the noise: far enough out that normal noise loses 2 % of its
-/// worth, and a false match beyond has no say.
-pub(super) const WIDTH: f64 = 6.0;
+/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth.
+const WIDTH: f64 = 2.8;
 
 /// The inliers that it is fitted over, in standard deviations.
 const WIDE: f64 = 9.0;
@@ -31,6 +30,9 @@ pub(super) struct Polished {
     pub(super) scored: Scored,
     /// The standard deviation of the inliers' residuals, in pixels.
     pub(super) sigma: f64,
+    /// The loss of the last refinement, and how far away, in pixels, a match still had a say.
+    pub(super) loss: HeavyTailed,
+    pub(super) limit: f64,
 }
 
 /// Refines a pose by least squares over its inliers, measures the noise, and refines it with a loss of that scale. The
@@ -45,17 +47,19 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
         refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
         take_better(poses, &mut best, motion);
     }
-    let sigma = sigma(poses, &best.motion);
-    poses.score(best.motion, WIDE * sigma);
+    let shown = sigma(poses, &best.motion);
+    let noise = noise::prudent(shown, poses.inliers.len(), threshold);
+    let (loss, limit) = (HeavyTailed::new(WIDTH * noise), WIDE * noise);
+    poses.score(best.motion, limit);
     if poses.inliers.len() >= FEWEST {
         let mut motion = best.motion;
         let subset = Subset::new(poses.observations, &poses.inliers);
-        refine(poses.observations, &subset, &mut motion, &Biweight::new(WIDTH * sigma), STEPS);
+        refine(poses.observations, &subset, &mut motion, &loss, STEPS);
         let scored = poses.best_pose(&motion.essential(), threshold);
         best = scored.unwrap_or(best);
     }
-    let sigma = self::sigma(poses, &best.motion);
-    Polished { scored: best, sigma }
+    let sigma = sigma(poses, &best.motion);
+    Polished { scored: best, sigma, loss, limit }
 }
 
 fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {

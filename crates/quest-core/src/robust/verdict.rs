@@ -182,7 +182,7 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     let size = length(observations, &motion, &inliers, sigma);
     let covariance = match model {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
-        _ => covariance::of_pose(observations, &motion, &inliers, sigma, size, false_matches),
+        _ => covariance::of_pose(observations, &motion, &inliers, &polished, size, false_matches),
     }?;
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {

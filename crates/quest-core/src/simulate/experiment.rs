@@ -120,9 +120,9 @@ pub struct Problem {
 pub enum Reading {
     /// The closest to the truth, as the paper has it, of the exact candidates.
     Exact,
-    /// The closest to the truth, of all kinds.
+    /// The closest to the truth, of all kinds that were asked for.
     All,
-    /// The one of all kinds that explains further points best: what can be had without the truth.
+    /// The one of them that explains further points best: what can be had without the truth.
     Selected,
 }
 
@@ -144,9 +144,9 @@ impl Reading {
 impl Problem {
     /// The errors of a solver by each reading, in the order of [`Reading::ALL`]; `None` where there is no candidate.
     #[must_use]
-    pub fn judge(&self, solver: SolverName) -> [Option<PoseErrors>; 3] {
+    pub fn judge(&self, solver: SolverName, kinds: Kinds) -> [Option<PoseErrors>; 3] {
         let mut candidates = Candidates::new();
-        solver.solve(Kinds::All, &self.scene.matches, &mut candidates);
+        solver.solve(kinds, &self.scene.matches, &mut candidates);
         self.judge_candidates(&candidates)
     }
 
@@ -209,7 +209,7 @@ mod tests {
         for base in [SceneOptions::default(), SceneOptions::realistic()] {
             let cell = &Figure::Four.cells(&base)[0];
             for trial in 0..50 {
-                let readings = cell.problem(2, trial).unwrap().judge(SolverName::Quest);
+                let readings = cell.problem(2, trial).unwrap().judge(SolverName::Quest, Kinds::All);
                 for errors in readings {
                     // The rounding of the images, times the condition of five points.
                     let errors = errors.unwrap();
@@ -224,7 +224,7 @@ mod tests {
         for figure in [Figure::Six, Figure::Seven] {
             let cell = &figure.cells(&SceneOptions::default())[0];
             for trial in 0..50 {
-                for errors in cell.problem(2, trial).unwrap().judge(SolverName::Quest) {
+                for errors in cell.problem(2, trial).unwrap().judge(SolverName::Quest, Kinds::All) {
                     let errors = errors.unwrap();
                     assert!(errors.rotation.is_finite() && errors.translation == 0.0);
                 }

@@ -1,16 +1,16 @@
 //! From an essential matrix to rotations and translation, over the real and the complex numbers.
 //!
-//! With `E = [t]× R` and `t·t = 1`
+//! With `E = s [t]× R` and `t·t = 1`
 //!
 //! ```text
-//! cof E = t (Rᵀ t)ᵀ        R = cof E − [t]× E        E·E = Σ E_ij² = 2
+//! cof E = s² t (Rᵀ t)ᵀ        s² R = cof E − s [t]× E        E·E = Σ E_ij² = 2 s²
 //! ```
 //!
 //! where no product is conjugated, so that the formulas hold for complex matrices as well. The other rotation is `t ⊗ q`.
 
-use nalgebra::{Complex, ComplexField};
+use nalgebra::ComplexField;
 
-use crate::algebra::number::Number;
+use crate::algebra::number::{ComplexNumber, Number};
 
 type Vector<T> = [T; 3];
 
@@ -36,26 +36,27 @@ pub(crate) fn decomposed<T: Number>(e: &[Vector<T>; 3]) -> ([T; 4], Vector<T>) {
     for x in e.as_flattened() {
         sum = sum + *x * *x;
     }
-    let scale = (T::real(2.0) / sum).square_root();
-    let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j] * scale));
+    let square = sum.times(0.5);
+    let scale = square.square_root();
+    let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j]));
     let cofactors: [Vector<T>; 3] =
         std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
     let longest = T::longer(&T::longer(&cofactors[0], &cofactors[1]), &cofactors[2]);
     let length = (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).square_root();
     let inverse = T::real(1.0) / length;
     let t = longest.map(|x| x * inverse);
+    let scaled = t.map(|x| x * scale);
     let r: [Vector<T>; 3] = std::array::from_fn(|j| {
-        let turned = cross(&t, &columns[j]);
+        let turned = cross(&scaled, &columns[j]);
         std::array::from_fn(|i| cofactors[j][i] - turned[i])
     });
-    (quaternion(&r), t)
+    (quaternion(&r, square), t)
 }
 
-/// The quaternion, of any scale, of an orthogonal matrix given by its columns: the longest row of `4 q qᵀ`.
+/// The quaternion, of any scale, of a multiple of an orthogonal matrix given by its columns: the longest row of `4 q qᵀ`.
 #[inline]
-fn quaternion<T: Number>(columns: &[Vector<T>; 3]) -> [T; 4] {
+fn quaternion<T: Number>(columns: &[Vector<T>; 3], one: T) -> [T; 4] {
     let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = *columns;
-    let one = T::real(1.0);
     let (wx, wy, wz) = (zy - yz, xz - zx, yx - xy);
     let (sxy, sxz, syz) = (yx + xy, zx + xz, zy + yz);
     let rows = [
@@ -80,16 +81,17 @@ pub(crate) fn twisted<T: Number>(q: &[T; 4], t: &Vector<T>) -> [T; 4] {
 ///
 /// `q·q` without conjugation turns by twice the phase, so that the choice does not depend on the frames of the
 /// cameras, unlike the one that makes the largest component real.
-pub(crate) fn real_part(q: [Complex<f64>; 4]) -> [f64; 4] {
-    let square: Complex<f64> = q.iter().map(|x| x * x).sum();
-    let phase = square.square_root().conj();
-    q.map(|x| (x * phase).re)
+#[inline]
+pub(crate) fn real_part<T: ComplexNumber>(q: [T; 4]) -> [T::Part; 4] {
+    let [w, x, y, z] = q.map(|x| x * x);
+    let phase = ((w + x) + (y + z)).square_root().conjugate();
+    q.map(|x| (x * phase).re())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+    use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
 
     fn planted(rotation: Vector3<f64>, t: Vector3<f64>) -> (UnitQuaternion<f64>, [[f64; 3]; 3]) {
         let q = UnitQuaternion::new(rotation);

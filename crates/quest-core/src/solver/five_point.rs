@@ -46,6 +46,7 @@ pub(crate) fn solve(
         Err(degeneracy) => return out.set_degeneracy(degeneracy),
         Ok(basis) => basis,
     };
+    let kinds = kinds.without_plane();
     let mut solutions = Solutions {
         basis,
         kinds,

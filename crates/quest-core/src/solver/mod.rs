@@ -52,6 +52,46 @@ pub enum Kinds {
     All,
     /// The real solutions alone.
     Exact,
+    /// Every kind, and the motions of the plane that explains the matches, where there is one: for scenes that may be
+    /// flat. [`Quest`], [`QuestEigen`] and [`Relinearization`] have them; to the others this is [`Kinds::All`].
+    Planar,
+}
+
+impl Kinds {
+    /// Every choice, the default first.
+    pub const CHOICES: [Self; 3] = [Self::All, Self::Exact, Self::Planar];
+
+    /// The name on the command line, in Python and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Exact => "exact",
+            Self::Planar => "planar",
+        }
+    }
+
+    /// What is left to a solver when the motions of a plane are seen to.
+    pub(crate) fn without_plane(self) -> Self {
+        if self == Self::Planar { Self::All } else { self }
+    }
+}
+
+/// No choice of candidates has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("kinds is {found:?}, expected one of {}", Kinds::CHOICES.map(Kinds::name).join(", "))]
+pub struct UnknownKinds {
+    /// The name that was asked for.
+    pub found: String,
+}
+
+impl FromStr for Kinds {
+    type Err = UnknownKinds;
+
+    fn from_str(name: &str) -> Result<Self, UnknownKinds> {
+        let found = Self::CHOICES.into_iter().find(|kinds| kinds.name() == name);
+        found.ok_or_else(|| UnknownKinds { found: name.to_owned() })
+    }
 }
 
 /// A solver: candidate poses from matches.

@@ -22,19 +22,19 @@
 //!
 //! The parallax-safe form is this project's; the elimination to degree ten is Nistér's (PAMI 2004).
 
-use nalgebra::{Complex, Quaternion, UnitQuaternion};
+use nalgebra::Complex;
 
 use super::aligned::{Alignment, Coordinates};
 use super::cubics::{Resultant, combine};
-use super::essential::{decompose, real_part, twisted};
+use super::essential::{decomposed, real_part, twisted};
 use super::gram::Gram;
 use super::motion::Motion;
 use super::shortlist::Shortlist;
-use super::two_motions::TwoMotions;
+use super::two_motions::{TwoMotions, after, apart, normalized};
 use super::{Kinds, PoseSolver, refining};
+use crate::algebra::number::TwoComplex;
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
-use crate::algebra::two::Two;
-use crate::structure::translation_direction;
+use crate::algebra::two::{Two, TwoQuaternions};
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// The default solver; its steps stand at the head of the module.
@@ -67,11 +67,13 @@ fn from_five(
         let complete = roots.real(|two, count| shortlist.push_solutions(two, count, alignment, matches));
         if kinds == Kinds::All {
             roots.complex(|q_21, nearly_real| {
-                let motion = Motion { q_21, direction: translation_direction(&q_21, matches) };
+                let two = TwoMotions::of_rotations(q_21, matches);
                 if nearly_real {
-                    shortlist.push_solution(motion, alignment, matches);
+                    shortlist.push_solutions(&two, 2, alignment, matches);
                 } else {
-                    shortlist.push(CandidateKind::FromComplex, motion);
+                    for motion in two.apart().into_iter().flatten() {
+                        shortlist.push(CandidateKind::FromComplex, motion);
+                    }
                 }
             });
         }
@@ -97,8 +99,10 @@ fn starts(gram: &Gram, [.., n1, n2, n3, n4]: &[Coordinates; 9]) -> Shortlist {
                 .all(|m| m.is_some())
         });
         roots.complex(|q_21, _| {
-            let direction = gram.direction(&q_21);
-            starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
+            for q_21 in apart(q_21).into_iter().flatten() {
+                let direction = gram.direction(&q_21);
+                starts.push(CandidateKind::FromComplex, Motion { q_21, direction });
+            }
         });
         if complete {
             break;
@@ -169,19 +173,19 @@ impl<'a> Roots<'a> {
 
     /// Hands over the real parts of both rotations of each complex pair of roots, and whether the pair may be two real
     /// ones that rounding has joined.
-    fn complex(&self, mut accept: impl FnMut(UnitQuaternion<f64>, bool)) {
+    fn complex(&self, mut accept: impl FnMut(&TwoQuaternions, bool)) {
         let mut roots = [Complex::from(0.0); 11];
         let count = complex_roots(&self.polynomial, self.real.as_slice(), &mut roots);
-        for &z in &roots[..count] {
+        for roots in roots[..count].chunks(2) {
+            let z = TwoComplex::new([roots[0], roots[roots.len() - 1]]);
             let coordinates = combine(self.basis, &self.resultant.point(z));
-            let Some((q, t)) = decompose(&self.alignment.essential(&coordinates)) else { continue };
-            for q in [q, twisted(&q, &t)] {
-                accept(unit(real_part(q)) * self.alignment.q0_21, z.im < NEARLY_REAL * (1.0 + z.re.abs()));
+            let (q, t) = decomposed(&self.alignment.essential(&coordinates));
+            let twins = [real_part(q), real_part(twisted(&q, &t))].map(|q| q.map(Two::to_array));
+            for (k, z) in roots.iter().enumerate() {
+                let q = std::array::from_fn(|i| Two::new([twins[0][i][k], twins[1][i][k]]));
+                let q_21 = after(&normalized(&q), &self.alignment.q0_21);
+                accept(&q_21, z.im < NEARLY_REAL * (1.0 + z.re.abs()));
             }
         }
     }
-}
-
-fn unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
 }

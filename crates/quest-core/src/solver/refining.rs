@@ -7,16 +7,27 @@
 //!    minima the ones stay that the noise may have made.
 //! 4. The squared Sampson errors over all matches decide the rest.
 //! 5. Where no candidate fits, the motion on which most matches agree is added (`consensus.rs`).
+//!
+//! Where they are asked for, the motions of a plane are added: that of the homography with the least squares, if it explains the
+//! matches much better than the best alignment does. Five points that lie on a plane leave two equations to spare, which
+//! solutions of the epipolar constraints make nothing of.
+
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::aligned::{Alignment, Coordinates};
 use super::gram::Gram;
-use super::shortlist::{Shortlist, pure_rotation, rotation_only};
+use super::homography::motions_of_plane;
+use super::shortlist::{Shortlist, pure_rotation};
 use super::{Kinds, consensus, one_line};
 use crate::structure::translation_direction;
-use crate::{Candidates, Correspondence, Degeneracy};
+use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
 /// The smallest number of matches of every solver here.
 pub(crate) const MIN_MATCHES: usize = 5;
+
+/// A plane explains matches if it misses each of them by less than this part of the parallax. Noise alone, without
+/// parallax, comes so close in one of fifty cases; five general points, to which a plane is an accident, in one of ten.
+const FLAT: f64 = 0.1;
 
 /// Fills `out` with the motions that the solver finds for five matches, or with the local minima that are reached from its
 /// `starts` for more, and with the rotation alone; what cannot be solved is answered with its reason.
@@ -47,16 +58,12 @@ pub(crate) fn solve(
             shortlist.push_essential(&pair, &alignment, five);
             Ok(())
         }
-        None => from_five(kinds, &alignment, five, &mut shortlist),
+        None => from_five(kinds.without_plane(), &alignment, five, &mut shortlist),
     };
     if let Err(degeneracy) = found {
         return out.set_degeneracy(degeneracy);
     }
-    if kinds == Kinds::All {
-        let q0_21 = alignment.q0_21;
-        out.push(rotation_only(q0_21, &translation_direction(&q0_21, matches), matches));
-    }
-    shortlist.write(kinds, matches, out);
+    write(kinds, &mut shortlist, &alignment, |q0_21| translation_direction(q0_21, matches), matches, out);
 }
 
 fn solve_many(
@@ -78,9 +85,27 @@ fn solve_many(
     if smallest > matches.len() as f64 * consensus::AGREEMENT.powi(2) {
         consensus::add(&mut minima, matches);
     }
-    if kinds == Kinds::All {
-        let q0_21 = gram.alignment.q0_21;
-        out.push(rotation_only(q0_21, &gram.direction(&q0_21), matches));
+    write(kinds, &mut minima, &gram.alignment, |q0_21| gram.direction(q0_21), matches, out);
+}
+
+/// Fills `out` with the motions found and, as far as they are asked for, those of a plane and the rotation alone with the
+/// direction that fits it.
+fn write(
+    kinds: Kinds,
+    shortlist: &mut Shortlist,
+    alignment: &Alignment,
+    direction: impl FnOnce(&UnitQuaternion<f64>) -> Vector3<f64>,
+    matches: &[Correspondence],
+    out: &mut Candidates,
+) {
+    if kinds == Kinds::Planar {
+        for motion in motions_of_plane(matches, FLAT * alignment.parallax).into_iter().flatten() {
+            shortlist.push_pair(CandidateKind::Planar, motion);
+        }
     }
-    minima.write(kinds, matches, out);
+    if kinds != Kinds::Exact {
+        let q0_21 = alignment.q0_21;
+        shortlist.push_rotation_only(q0_21, direction(&q0_21));
+    }
+    shortlist.write(kinds.without_plane(), matches, out);
 }

@@ -11,7 +11,7 @@ use super::two_motions::TwoMotions;
 use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
-use crate::structure::{Completed, pair_with_depths, with_depths};
+use crate::structure::{Completed, two_with_depths, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -116,6 +116,21 @@ impl Shortlist {
         self.push_item(&Item { kind, motion, is_pair: true });
     }
 
+    /// Adds the best alignment as a motion without translation, with the direction of one that fits it best, whatever is there
+    /// already.
+    pub(crate) fn push_rotation_only(&mut self, q_21: UnitQuaternion<f64>, direction: Vector3<f64>) {
+        let item =
+            Item { kind: CandidateKind::RotationOnly, motion: Motion { q_21, direction }, is_pair: false };
+        self.append(&item);
+    }
+
+    fn append(&mut self, item: &Item) {
+        if let Some(place) = self.items.get_mut(self.len) {
+            *place = *item;
+            self.len += 1;
+        }
+    }
+
     /// A duplicate counts as exact if either of the two is.
     fn push_item(&mut self, new: &Item) {
         let same = self.same;
@@ -126,10 +141,7 @@ impl Shortlist {
         if self.iter().any(replaces) {
             self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
         }
-        if let Some(place) = self.items.get_mut(self.len) {
-            *place = *new;
-            self.len += 1;
-        }
+        self.append(new);
     }
 
     /// Adds the solution of five constraints near `start`, and the twisted one beside it; a start from which
@@ -235,34 +247,40 @@ impl Shortlist {
 
     /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
     pub(crate) fn write(&self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
-        for Item { kind, motion: Motion { q_21, direction }, is_pair } in self.iter() {
-            if kinds != Kinds::All && *kind != CandidateKind::Exact {
-                continue;
-            }
-            if *is_pair {
-                for completed in pair_with_depths(*q_21, direction, matches) {
-                    out.push(candidate(*kind, &completed));
-                }
+        let wanted = self.iter().filter(|item| kinds == Kinds::All || item.kind == CandidateKind::Exact);
+        let mut waiting: Option<&Item> = None;
+        for item in wanted {
+            if item.is_pair {
+                push_two([item.kind; 2], &item.motion, &item.motion.twisted(), matches, out);
+            } else if let Some(first) = waiting.take() {
+                push_two([first.kind, item.kind], &first.motion, &item.motion, matches, out);
             } else {
-                out.push(candidate(*kind, &with_depths(*q_21, direction, matches)));
+                waiting = Some(item);
             }
         }
+        if let Some(Item { kind, motion: Motion { q_21, direction }, .. }) = waiting {
+            out.push(candidate(*kind, &with_depths(*q_21, direction, matches)));
+        }
         rank(out);
+    }
+}
+
+fn push_two(
+    kinds: [CandidateKind; 2],
+    first: &Motion,
+    second: &Motion,
+    matches: &[Correspondence],
+    out: &mut Candidates,
+) {
+    let (q_21, directions) = ([first.q_21, second.q_21], [first.direction, second.direction]);
+    for (kind, completed) in kinds.into_iter().zip(two_with_depths(&q_21, &directions, matches)) {
+        out.push(candidate(kind, &completed));
     }
 }
 
 fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
     let Completed { pose, in_front, residual } = *completed;
     Candidate { kind, pose, residual, in_front }
-}
-
-/// The rotation-only candidate: the best alignment, and the direction of the translation that fits it best.
-pub(crate) fn rotation_only(
-    q0_21: UnitQuaternion<f64>,
-    direction: &Vector3<f64>,
-    matches: &[Correspondence],
-) -> Candidate {
-    candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
 /// Empties `out` and answers too few matches and exact pure rotations, which no solver needs to look at; whether it did.
@@ -294,26 +312,29 @@ pub(crate) fn pure_rotation(alignment: &Alignment, matches: &[Correspondence], o
 }
 
 /// Best first: most points in front, then the smallest residual, then the smallest rotation.
-#[expect(clippy::needless_bitwise_bool, reason = "a branch would be mispredicted half of the time")]
 pub(crate) fn rank(out: &mut Candidates) {
-    // Positive numbers are ordered as their bits are: keys are compared as integers, without branches.
-    let mut keys = [[0; 3]; Candidates::CAPACITY];
-    for (key, c) in keys.iter_mut().zip(out.iter()) {
-        let residual = c.residual.max(ROUNDING).to_bits();
-        *key = [u64::MAX - c.in_front as u64, residual, u64::MAX - c.pose.wxyz()[0].abs().to_bits()];
+    let mut keys = [0; Candidates::CAPACITY];
+    for (k, (key, candidate)) in keys.iter_mut().zip(out.iter()).enumerate() {
+        *key = rank_key(candidate) | k as u128;
     }
-    let keys = &keys[..out.len()];
-    let mut places = [0; Candidates::CAPACITY];
-    for (i, x) in keys.iter().enumerate() {
-        for (j, y) in keys[..i].iter().enumerate() {
-            let comes_first =
-                (x[0] < y[0]) | ((x[0] == y[0]) & ((x[1] < y[1]) | ((x[1] == y[1]) & (x[2] < y[2]))));
-            places[i] += usize::from(!comes_first);
-            places[j] += usize::from(comes_first);
-        }
-    }
+    let keys = &mut keys[..out.len()];
+    keys.sort_unstable();
     let unordered = out.clone();
-    for (candidate, place) in unordered.iter().zip(places) {
-        out.as_mut_slice()[place] = *candidate;
+    for (place, key) in out.as_mut_slice().iter_mut().zip(keys) {
+        *place = unordered[*key as usize % KEY_UNIT];
     }
+}
+
+/// Room for the place of a candidate below its key.
+const KEY_UNIT: usize = Candidates::CAPACITY.next_power_of_two();
+
+/// A number that is smaller for what comes first: 24 bits for the points in front, 64 for the residual (positive numbers are
+/// ordered as their bits are), and 35 for the rotation, above those that are left free.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 35 bits")]
+#[inline]
+fn rank_key(candidate: &Candidate) -> u128 {
+    let behind = (1_u128 << 24) - 1 - (candidate.in_front as u128).min((1 << 24) - 1);
+    let residual = u128::from(candidate.residual.max(ROUNDING).to_bits());
+    let turned = ((1.0 - candidate.pose.wxyz()[0].abs()).max(0.0) * (1_u64 << 34) as f64) as u64;
+    (behind << 104) | (residual << 40) | (u128::from(turned) * KEY_UNIT as u128)
 }

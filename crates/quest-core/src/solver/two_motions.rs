@@ -9,16 +9,14 @@ use super::aligned::Alignment;
 use super::essential::decomposed;
 use super::motion::Motion;
 use crate::Correspondence;
-use crate::algebra::two::{Two, TwoVectors, both, cross, dot};
+use crate::algebra::two::{Two, TwoQuaternions, TwoVectors, both, cross, dot, rotation};
+use crate::structure::translation_directions;
 
 /// Newton's iteration takes one or two steps; a double root takes them all.
 const MAX_NEWTON_STEPS: usize = 10;
 
 /// The squares of five constraints whose unit bearings are rounded, with a margin.
 const ROUNDING: f64 = 1e-30;
-
-/// Quaternions, scalar first.
-type TwoQuaternions = [Two; 4];
 
 /// Two relative poses without the length of their translations.
 #[derive(Clone, Copy)]
@@ -42,24 +40,27 @@ impl TwoMotions {
         Self { q_21: normalized(&q_21), direction }
     }
 
+    /// Unit quaternions, each with the translation that fits it best.
+    #[inline]
+    pub(crate) fn of_rotations(q_21: &TwoQuaternions, matches: &[Correspondence]) -> Self {
+        Self { q_21: *q_21, direction: translation_directions(&rotation(q_21), matches) }
+    }
+
     /// After another rotation `q0_21`: `R ← R R0`.
     #[inline]
     pub(crate) fn after(&self, q0_21: &UnitQuaternion<f64>) -> Self {
-        let q0 = q0_21.quaternion();
-        let q0 = [q0.w, q0.i, q0.j, q0.k].map(Two::splat);
-        Self { q_21: product(&self.q_21, &q0), ..*self }
+        Self { q_21: after(&self.q_21, q0_21), ..*self }
     }
 
     /// The motions; `None` for one that is not finite.
     #[inline]
     pub(crate) fn apart(&self) -> [Option<Motion>; 2] {
-        let ([w, x, y, z], [tx, ty, tz]) = (self.q_21.map(Two::to_array), self.direction.map(Two::to_array));
-        std::array::from_fn(|k| {
-            let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w[k], x[k], y[k], z[k]));
+        let ([first, second], [tx, ty, tz]) = (apart(&self.q_21), self.direction.map(Two::to_array));
+        let motion = |k: usize, q_21: UnitQuaternion<f64>| {
             let direction = Vector3::new(tx[k], ty[k], tz[k]);
-            let sum = q_21.coords.sum() + direction.sum();
-            sum.is_finite().then_some(Motion { q_21, direction })
-        })
+            direction.sum().is_finite().then_some(Motion { q_21, direction })
+        };
+        [first.and_then(|q| motion(0, q)), second.and_then(|q| motion(1, q))]
     }
 
     /// The solutions of five constraints that Newton's iteration leads to; `None` where it does not converge.
@@ -119,6 +120,23 @@ impl TwoMotions {
     }
 }
 
+/// `q_21 ⊗ q0_21`.
+#[inline]
+pub(crate) fn after(q_21: &TwoQuaternions, q0_21: &UnitQuaternion<f64>) -> TwoQuaternions {
+    let q0 = q0_21.quaternion();
+    product(q_21, &[q0.w, q0.i, q0.j, q0.k].map(Two::splat))
+}
+
+/// Unit quaternions one by one; `None` for one that is not finite.
+#[inline]
+pub(crate) fn apart(q_21: &TwoQuaternions) -> [Option<UnitQuaternion<f64>>; 2] {
+    let [w, x, y, z] = q_21.map(Two::to_array);
+    std::array::from_fn(|k| {
+        let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w[k], x[k], y[k], z[k]));
+        q_21.coords.sum().is_finite().then_some(q_21)
+    })
+}
+
 /// A step of Newton's iteration.
 struct Step {
     /// Where it leads.
@@ -142,7 +160,7 @@ fn scaled<const N: usize>(x: &[Two; N], factor: Two) -> [Two; N] {
 }
 
 #[inline]
-fn normalized<const N: usize>(x: &[Two; N]) -> [Two; N] {
+pub(crate) fn normalized<const N: usize>(x: &[Two; N]) -> [Two; N] {
     let square = x.iter().fold(Two::ZERO, |sum, x| sum + *x * *x);
     scaled(x, Two::splat(1.0) / square.sqrt())
 }
@@ -156,21 +174,6 @@ fn product(p: &TwoQuaternions, q: &TwoQuaternions) -> TwoQuaternions {
         (a * x + b * w) + (c * z - d * y),
         (a * y + c * w) + (d * x - b * z),
         (a * z + d * w) + (b * y - c * x),
-    ]
-}
-
-/// The rotation matrices of unit quaternions, row by row.
-#[inline]
-fn rotation(q: &TwoQuaternions) -> [TwoVectors; 3] {
-    let [w, x, y, z] = *q;
-    let (x2, y2, z2, one) = (x + x, y + y, z + z, Two::splat(1.0));
-    let (xx, yy, zz) = (x * x2, y * y2, z * z2);
-    let (xy, xz, yz) = (x * y2, x * z2, y * z2);
-    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
-    [
-        [one - (yy + zz), xy - wz, xz + wy],
-        [xy + wz, one - (xx + zz), yz - wx],
-        [xz - wy, yz + wx, one - (xx + yy)],
     ]
 }
 

@@ -40,8 +40,8 @@ pub(super) fn draw(canvas: &Canvas, panel: &Panel, size: [i32; 2]) -> Result<(),
         .map_err(drawing)?;
     chart
         .configure_mesh()
-        .x_labels(usize::try_from(inside[0] / 42).unwrap_or(0).clamp(2, 10))
-        .y_labels(usize::try_from(inside[1] / 45).unwrap_or(0).clamp(2, 10))
+        .x_labels(usize::try_from(inside[0] / 34).unwrap_or(0).clamp(2, 10))
+        .y_labels(usize::try_from(inside[1] / 38).unwrap_or(0).clamp(2, 10))
         .set_all_tick_mark_size(4 * FINE)
         .light_line_style(TRANSPARENT)
         .bold_line_style(ink::stroke(GRID, 10, 1.0))

@@ -39,7 +39,7 @@ __version__: str
 _Array: TypeAlias = NDArray[np.float64]
 _Bools: TypeAlias = NDArray[np.bool_]
 _Counts: TypeAlias = NDArray[np.uint64]
-_Kind: TypeAlias = Literal["exact", "from_complex", "rotation_only"]
+_Kind: TypeAlias = Literal["exact", "from_complex", "rotation_only", "planar"]
 _Model: TypeAlias = Literal["general", "planar", "pure_rotation"]
 
 class QuestError(ValueError): ...
@@ -119,7 +119,7 @@ def solve(
     camera2: Camera | ArrayLike | None = None,
     *,
     solver: str | None = None,
-    kinds: Literal["all", "exact"] = "all",
+    kinds: Literal["all", "exact", "planar"] = "all",
 ) -> list[Candidate]: ...
 @type_check_only
 class _RunnerUpDict(TypedDict):
