@@ -3,8 +3,8 @@
 //! For more than five matches:
 //! 1. All constraints become one matrix in the frame of the best alignment (`gram.rs`).
 //! 2. The solver finds the solutions of the few constraints that stand for all.
-//! 3. Each leads to a local minimum of a cost near the Sampson errors that does not depend on the number of matches; of these
-//!    minima the ones stay that the noise may have made.
+//! 3. Each leads to a local minimum: of the squared Sampson errors for few matches, else of a cost near them that does not
+//!    depend on the number of matches. Of these minima the ones stay that the noise may have made.
 //! 4. The squared Sampson errors over all matches decide the rest.
 //! 5. Where no candidate fits, the motion on which most matches agree is added (`consensus.rs`).
 //!
