@@ -10,7 +10,7 @@ use super::{closest, noisy};
 const SEED_PLANES: u64 = 107;
 const WITH_PLANES: [SolverName; 3] = [SolverName::Quest, SolverName::QuestEigen, SolverName::Relinearization];
 
-fn is_planar(candidate: &&Candidate) -> bool {
+fn is_planar(candidate: &Candidate) -> bool {
     candidate.kind == CandidateKind::Planar
 }
 
@@ -46,7 +46,7 @@ fn there_are_none_without_a_plane_or_beside_its_exact_solutions() {
     // Five points that noise moves without parallax lie close to a plane by accident once in a while.
     for (options, most) in [(exact_plane, 0), (turned, 10), (spread, 0)] {
         let found = |one: &Scene| solve(SolverName::Quest, Kinds::Planar, &one.matches);
-        let is_flat = |one: &Scene| found(one).iter().any(|c| is_planar(&c));
+        let is_flat = |one: &Scene| found(one).iter().any(is_planar);
         let count = scenes(options, SEED_PLANES, 300).filter(is_flat).count();
         assert!(count <= most, "{count} {options:?}");
     }

@@ -441,7 +441,7 @@ mod tests {
                 *x = rng.random_range(-1.0..1.0);
             }
             agrees_with_faer(&a);
-            let b: [[f64; 10]; 10] = std::array::from_fn(|i| std::array::from_fn(|j| a[i][j]));
+            let b: [[f64; 10]; 10] = from_fn(|i| from_fn(|j| a[i][j]));
             agrees_with_faer(&b);
         }
     }

@@ -131,11 +131,11 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(15);
         for round in 0..1000 {
             // Of rank 0 to 9, with eigenvalues that may repeat or differ by many powers of ten.
-            let (rank, steep) = (round % 10, [1.0, 1e-1, 1e-4][round % 3]);
+            let (rank, steep) = (round % 10, [1.0_f64, 1e-1, 1e-4][round % 3]);
             let random = SMatrix::<f64, 9, 9>::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let q = random.qr().q();
             let planted: [f64; 9] =
-                std::array::from_fn(|k| if k < rank { f64::powi(steep, k as i32) } else { 0.0 });
+                std::array::from_fn(|k| if k < rank { steep.powf(k as f64) } else { 0.0 });
             let m = q * SMatrix::from_diagonal(&planted.into()) * q.transpose();
             let (values, vectors) = eigen::<9>(std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)])));
             let v = SMatrix::<f64, 9, 9>::from_fn(|i, j| vectors[j][i]);
