@@ -120,9 +120,9 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// Twenty rotations solve the five-point problem; the rotation-only candidate and a few of a special
-    /// kind (the motions of a homography) come on top.
-    pub const CAPACITY: usize = 24;
+    /// Twenty rotations solve the five-point problem; the rotation-only candidate and the four motions of a
+    /// homography come on top.
+    pub const CAPACITY: usize = 25;
 
     /// An empty list.
     #[must_use]

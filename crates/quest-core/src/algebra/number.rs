@@ -1,10 +1,13 @@
 //! What the solutions are computed with: real and complex numbers, and two of either side by side.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, RangeInclusive, Sub};
 
 use nalgebra::Complex;
 
 use super::two::Two;
+
+/// Sums of squares of numbers whose squares lose nothing either.
+const RANGE: RangeInclusive<f64> = 1e-100..=1e100;
 
 /// A number.
 pub(crate) trait Number:
@@ -22,6 +25,12 @@ pub(crate) trait Number:
     /// The square root; of a complex number the one with a real part that is not negative, and without angles: a tenth of the
     /// time.
     fn square_root(self) -> Self;
+
+    /// Numbers not all zero, of the same ratios and of order one, so that powers of them neither overflow nor vanish.
+    fn of_order_one<const N: usize>(x: [Self; N]) -> [Self; N];
+
+    /// Whether a vector is finite, and its square far from overflow and from zero.
+    fn is_in_range<const N: usize>(x: &[Self; N]) -> bool;
 
     /// The longer of two vectors.
     fn longer<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N];
@@ -51,6 +60,17 @@ impl Number for f64 {
     }
 
     #[inline]
+    fn of_order_one<const N: usize>(x: [Self; N]) -> [Self; N] {
+        let inverse = 1.0 / x.iter().map(|x| x.abs()).sum::<f64>();
+        x.map(|x| x * inverse)
+    }
+
+    #[inline]
+    fn is_in_range<const N: usize>(x: &[Self; N]) -> bool {
+        RANGE.contains(&x.iter().map(|x| x * x).sum::<f64>())
+    }
+
+    #[inline]
     fn longer<const N: usize>(x: &[Self; N], y: &[Self; N]) -> [Self; N] {
         let square = |v: &[Self; N]| v.iter().map(|x| x * x).sum::<f64>();
         if square(y) > square(x) { *y } else { *x }
@@ -76,6 +96,17 @@ impl Number for Complex<f64> {
         }
         let other = 0.5 * self.im / half;
         if self.re >= 0.0 { Self::new(half, other) } else { Self::new(other.abs(), half.copysign(self.im)) }
+    }
+
+    #[inline]
+    fn of_order_one<const N: usize>(x: [Self; N]) -> [Self; N] {
+        let inverse = 1.0 / x.iter().map(Self::l1_norm).sum::<f64>();
+        x.map(|x| x * inverse)
+    }
+
+    #[inline]
+    fn is_in_range<const N: usize>(x: &[Self; N]) -> bool {
+        RANGE.contains(&x.iter().map(Self::norm_sqr).sum::<f64>())
     }
 
     #[inline]
@@ -108,6 +139,18 @@ impl Number for Two {
     #[inline]
     fn square_root(self) -> Self {
         self.sqrt()
+    }
+
+    #[inline]
+    fn of_order_one<const N: usize>(x: [Self; N]) -> [Self; N] {
+        let inverse = Self::splat(1.0) / x.iter().fold(Self::ZERO, |sum, x| sum + x.abs());
+        x.map(|x| x * inverse)
+    }
+
+    #[inline]
+    fn is_in_range<const N: usize>(x: &[Self; N]) -> bool {
+        let square = x.iter().fold(Self::ZERO, |sum, x| sum + *x * *x);
+        square.to_array().iter().all(|square| RANGE.contains(square))
     }
 
     #[inline]
@@ -197,12 +240,24 @@ impl Number for TwoComplex {
         let half = ((self.square_norm().sqrt() + self.re.abs()) * 0.5).sqrt();
         let other = self.im * 0.5 / half;
         let is_right = self.re.simd_ge(Two::ZERO);
-        let signed = self.im.simd_lt(Two::ZERO).select(-half, half);
+        let signed = half | (self.im & Two::splat(-0.0));
         let is_zero = half.simd_eq(Two::ZERO);
         Self {
             re: is_zero.select(half, is_right.select(half, other.abs())),
             im: is_zero.select(half, is_right.select(other, signed)),
         }
+    }
+
+    #[inline]
+    fn of_order_one<const N: usize>(x: [Self; N]) -> [Self; N] {
+        let inverse = Two::splat(1.0) / x.iter().fold(Two::ZERO, |sum, x| sum + (x.re.abs() + x.im.abs()));
+        x.map(|x| Self { re: x.re * inverse, im: x.im * inverse })
+    }
+
+    #[inline]
+    fn is_in_range<const N: usize>(x: &[Self; N]) -> bool {
+        let square = x.iter().fold(Two::ZERO, |sum, x| sum + x.square_norm());
+        square.to_array().iter().all(|square| RANGE.contains(square))
     }
 
     #[inline]

@@ -32,13 +32,22 @@ pub(crate) fn decompose<T: Number + ComplexField>(e: &[Vector<T>; 3]) -> Option<
 /// The same, not finite for a matrix that is zero or not finite.
 #[inline]
 pub(crate) fn decomposed<T: Number>(e: &[Vector<T>; 3]) -> ([T; 4], Vector<T>) {
+    let entries: [T; 9] = std::array::from_fn(|k| e[k / 3][k % 3]);
+    let found = decomposed_in_range(&entries);
+    // The formulas take fourth powers.
+    if T::is_in_range(&found.0) { found } else { decomposed_in_range(&T::of_order_one(entries)) }
+}
+
+/// The same of a matrix, row by row, of an ordinary scale.
+#[inline]
+fn decomposed_in_range<T: Number>(e: &[T; 9]) -> ([T; 4], Vector<T>) {
     let mut sum = T::real(0.0);
-    for x in e.as_flattened() {
+    for x in e {
         sum = sum + *x * *x;
     }
     let square = sum.times(0.5);
     let scale = square.square_root();
-    let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[i][j]));
+    let columns: [Vector<T>; 3] = std::array::from_fn(|j| std::array::from_fn(|i| e[3 * i + j]));
     let cofactors: [Vector<T>; 3] =
         std::array::from_fn(|j| cross(&columns[(j + 1) % 3], &columns[(j + 2) % 3]));
     let longest = T::longer(&T::longer(&cofactors[0], &cofactors[1]), &cofactors[2]);

@@ -161,6 +161,10 @@ impl Solutions<'_> {
     /// has joined, where there is next to no imaginary part.
     pub(crate) fn push_real_part(&mut self, value: Complex<f64>, q: [Complex<f64>; 4]) {
         let q_21 = unit(real_part(q));
+        // Nothing real may be left of it.
+        if !q_21.coords.sum().is_finite() {
+            return;
+        }
         let start = Motion { q_21, direction: translation_direction(&q_21, self.matches) };
         if !(is_nearly_real(value) && self.push_solution(start)) {
             self.shortlist.push(CandidateKind::FromComplex, start);

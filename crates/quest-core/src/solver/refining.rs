@@ -17,7 +17,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::aligned::{Alignment, Coordinates};
 use super::gram::Gram;
 use super::homography::motions_of_plane;
-use super::shortlist::{Shortlist, pure_rotation};
+use super::shortlist::{Shortlist, pure_rotation, rotation_only};
 use super::{Kinds, consensus, one_line};
 use crate::structure::translation_direction;
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
@@ -105,7 +105,7 @@ fn write(
     }
     if kinds != Kinds::Exact {
         let q0_21 = alignment.q0_21;
-        shortlist.push_rotation_only(q0_21, direction(&q0_21));
+        out.push(rotation_only(q0_21, &direction(&q0_21), matches));
     }
     shortlist.write(kinds.without_plane(), matches, out);
 }

@@ -116,21 +116,6 @@ impl Shortlist {
         self.push_item(&Item { kind, motion, is_pair: true });
     }
 
-    /// Adds the best alignment as a motion without translation, with the direction of one that fits it best, whatever is there
-    /// already.
-    pub(crate) fn push_rotation_only(&mut self, q_21: UnitQuaternion<f64>, direction: Vector3<f64>) {
-        let item =
-            Item { kind: CandidateKind::RotationOnly, motion: Motion { q_21, direction }, is_pair: false };
-        self.append(&item);
-    }
-
-    fn append(&mut self, item: &Item) {
-        if let Some(place) = self.items.get_mut(self.len) {
-            *place = *item;
-            self.len += 1;
-        }
-    }
-
     /// A duplicate counts as exact if either of the two is.
     fn push_item(&mut self, new: &Item) {
         let same = self.same;
@@ -141,7 +126,10 @@ impl Shortlist {
         if self.iter().any(replaces) {
             self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
         }
-        self.append(new);
+        if let Some(place) = self.items.get_mut(self.len) {
+            *place = *new;
+            self.len += 1;
+        }
     }
 
     /// Adds the solution of five constraints near `start`, and the twisted one beside it; a start from which
@@ -215,7 +203,13 @@ impl Shortlist {
         let (mut minima, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
         for items in self.items[..self.len].chunks(2) {
             let mut motions = [items[0].motion, items[items.len() - 1].motion];
-            let costs = two_descents::minimise_sampson(&mut motions, matches, until);
+            let costs = if let [motion, _] = &mut motions
+                && items.len() == 1
+            {
+                [motion.minimise_sampson(matches, f64::INFINITY, until); 2]
+            } else {
+                two_descents::minimise_sampson(&mut motions, matches, until)
+            };
             for ((item, motion), cost) in items.iter().zip(motions).zip(costs) {
                 smallest = smallest.min(cost);
                 minima.push_pair(item.kind, motion);
@@ -281,6 +275,15 @@ fn push_two(
 fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
     let Completed { pose, in_front, residual } = *completed;
     Candidate { kind, pose, residual, in_front }
+}
+
+/// The rotation-only candidate: the best alignment, and the direction of the translation that fits it best.
+pub(crate) fn rotation_only(
+    q0_21: UnitQuaternion<f64>,
+    direction: &Vector3<f64>,
+    matches: &[Correspondence],
+) -> Candidate {
+    candidate(CandidateKind::RotationOnly, &with_depths(q0_21, direction, matches))
 }
 
 /// Empties `out` and answers too few matches and exact pure rotations, which no solver needs to look at; whether it did.
