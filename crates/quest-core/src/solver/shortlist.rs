@@ -203,10 +203,8 @@ impl Shortlist {
         let (mut minima, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
         for items in self.items[..self.len].chunks(2) {
             let mut motions = [items[0].motion, items[items.len() - 1].motion];
-            let costs = if let [motion, _] = &mut motions
-                && items.len() == 1
-            {
-                [motion.minimise_sampson(matches, f64::INFINITY, until); 2]
+            let costs = if items.len() == 1 {
+                [motions[0].minimise_sampson(matches, f64::INFINITY, until); 2]
             } else {
                 two_descents::minimise_sampson(&mut motions, matches, until)
             };
