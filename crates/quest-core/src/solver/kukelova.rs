@@ -24,7 +24,7 @@
 //! which also says what becomes of more than five matches).
 //!
 //! **Degenerate**: fewer than five independent constraints (all points on a line, repeated points); an exact pure
-//! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.001 one true rotation in thirty is
+//! rotation. As the parallax vanishes the ten solutions run together: at a parallax of 0.001 one true rotation in 200 is
 //! lost.
 //!
 //! **Solutions**: ten essential matrices, counting complex ones, a conjugate pair of which gives two candidates and a real
