@@ -78,13 +78,7 @@ impl BatchSolver {
         samples: &[[u32; 5]],
         out: &mut Essentials,
     ) -> Result<(), SampleError> {
-        out.clear();
-        let batch = Batch { tolerance: self.tolerance, matches, samples, out };
-        let result = self.token.run(batch);
-        if result.is_err() {
-            out.clear();
-        }
-        result
+        self.run(Rest::Flagged, matches, samples, out)
     }
 
     /// The same, with the samples that are not complete solved again by [`Quest`]. Every sample is complete then; one without
@@ -98,17 +92,36 @@ impl BatchSolver {
         samples: &[[u32; 5]],
         out: &mut Essentials,
     ) -> Result<(), SampleError> {
-        self.solve(matches, samples, out)?;
-        for (sample, indices) in samples.iter().enumerate() {
-            if !out.is_complete(sample) {
-                out.replace(sample, alone(&indices.map(|i| matches[i as usize])));
-            }
+        self.run(Rest::Solved, matches, samples, out)
+    }
+
+    fn run(
+        &self,
+        rest: Rest,
+        matches: &[Correspondence],
+        samples: &[[u32; 5]],
+        out: &mut Essentials,
+    ) -> Result<(), SampleError> {
+        out.clear();
+        let result = self.token.run(Batch { tolerance: self.tolerance, rest, matches, samples, out });
+        if result.is_err() {
+            out.clear();
         }
-        Ok(())
+        result
     }
 }
 
+/// What becomes of samples that lanes cannot solve for sure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Rest {
+    /// They are not complete, and say so.
+    Flagged,
+    /// The scalar solver solves them.
+    Solved,
+}
+
 /// The essential matrices of five matches by the scalar solver.
+#[inline(never)]
 fn alone(matches: &[Correspondence; 5]) -> impl Iterator<Item = [f64; 9]> {
     let mut candidates = Candidates::new();
     Quest { kinds: Kinds::Exact }.solve(matches, &mut candidates);
@@ -133,6 +146,7 @@ fn alone(matches: &[Correspondence; 5]) -> impl Iterator<Item = [f64; 9]> {
 /// One call's work.
 struct Batch<'a> {
     tolerance: Tolerance,
+    rest: Rest,
     matches: &'a [Correspondence],
     samples: &'a [[u32; 5]],
     out: &'a mut Essentials,
@@ -161,8 +175,12 @@ impl Batch<'_> {
             gather::<L>(self.matches, samples, &mut bearings)
                 .map_err(|error| SampleError { sample: error.sample + group * L::COUNT, ..error })?;
             solve_group(lanes, tables, self.tolerance, &bearings, &mut space, &mut found);
-            for lane in 0..samples.len() {
-                self.out.push_sample(found.is_complete[lane], found.of(lane));
+            for (lane, sample) in samples.iter().enumerate() {
+                if self.rest == Rest::Solved && !found.is_complete[lane] {
+                    self.out.push_sample(true, alone(&sample.map(|i| self.matches[i as usize])));
+                } else {
+                    self.out.push_sample(found.is_complete[lane], found.of(lane));
+                }
             }
         }
         Ok(())

@@ -107,19 +107,6 @@ impl Essentials {
         self.complete.push(complete);
         self.first.push(index(self.len()));
     }
-
-    /// Puts others in place of the essential matrices of a sample, which are complete.
-    pub(super) fn replace(&mut self, sample: usize, matrices: impl Iterator<Item = [f64; 9]>) {
-        let (old, before) = (self.of(sample), self.len());
-        self.matrices.extend(matrices);
-        let count = self.len() - before;
-        self.matrices[old.start..].rotate_right(count);
-        self.matrices.drain(old.start + count..old.end + count);
-        for first in &mut self.first[sample + 1..] {
-            *first = *first + index(count) - index(old.len());
-        }
-        self.complete[sample] = true;
-    }
 }
 
 /// An index of a matrix: ten of each of 2³² / 10 samples fit.
