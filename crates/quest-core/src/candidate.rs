@@ -7,6 +7,7 @@ use crate::{Correspondence, RelativePose};
 
 /// Where a candidate comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum CandidateKind {
     /// A real solution of the constraints (a local minimum of their squares for more than five matches).
@@ -35,6 +36,7 @@ impl CandidateKind {
 
 /// Why the matches do not determine a pose, or determine only a part of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Degeneracy {
     /// Fewer matches than the solver needs.
@@ -85,10 +87,12 @@ impl fmt::Display for Degeneracy {
 
 /// One pose that may be the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Candidate {
     /// Where it comes from.
     pub kind: CandidateKind,
     /// The pose. The mean absolute depth over both views is 1, so `|t_21|` is the parallax of (63).
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub pose: RelativePose,
     /// Root mean square over the matches, in radians, of the angle by which each bearing of a match would
     /// have to turn to satisfy the epipolar constraint (the Sampson error on the sphere).

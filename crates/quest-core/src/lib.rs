@@ -30,6 +30,15 @@
 //!
 //! Frames, signs, scale and units: [`conventions`].
 //!
+//! # Features
+//! None is on by default, and none changes a result.
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `rayon` | [`robust::estimate_batch`] on all cores |
+//! | `serde` | poses, candidates, cameras, estimates and [`robust::Options`] to and from serialised data, in the words of the tool's files |
+//! | `mint` | nalgebra's conversions between its types, those of this crate's interface, and `mint`'s, which other mathematics crates share |
+//!
 //! # The paper
 //! K. Fathian, J. Jin, S.-G. Wee, D.-H. Lee, Y.-G. Kim, N. R. Gans, *Camera relative pose estimation for visual servoing
 //! using quaternions*, Robotics and Autonomous Systems (2018),
@@ -65,6 +74,8 @@ pub mod lanes;
 pub mod pose;
 pub mod quaternion;
 pub mod robust;
+#[cfg(feature = "serde")]
+mod serial;
 pub mod servo;
 pub mod simulate;
 pub mod solver;

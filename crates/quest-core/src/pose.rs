@@ -12,6 +12,11 @@ pub(crate) const PARALLEL: f64 = 8.0 * f64::EPSILON;
 ///
 /// `t_21` shares its scale with the depths; see [`crate::Candidate::depths`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(into = "crate::serial::PoseForm", try_from = "crate::serial::PoseForm")
+)]
 pub struct RelativePose {
     /// The rotation as a unit quaternion; [`wxyz`](Self::wxyz) gives it scalar first.
     pub q_21: UnitQuaternion<f64>,

@@ -84,6 +84,11 @@ const MAX_PARAMETERS: usize = 12;
 /// # Ok::<(), quest_core::CameraError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(into = "crate::serial::CameraForm", try_from = "crate::serial::CameraForm")
+)]
 pub struct Camera {
     model: CameraModel,
     params: [f64; MAX_PARAMETERS],

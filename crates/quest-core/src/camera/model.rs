@@ -9,6 +9,11 @@ use super::CameraError;
 ///
 /// The formulas stand in the [module documentation](crate::camera).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "SCREAMING_SNAKE_CASE")
+)]
 #[non_exhaustive]
 pub enum CameraModel {
     /// `SIMPLE_PINHOLE`: `f, cx, cy`.
@@ -20,10 +25,13 @@ pub enum CameraModel {
     /// `RADIAL`: `f, cx, cy, k1, k2`.
     Radial,
     /// `OPENCV`: `fx, fy, cx, cy, k1, k2, p1, p2`.
+    #[cfg_attr(feature = "serde", serde(rename = "OPENCV"))]
     OpenCv,
     /// `OPENCV_FISHEYE`: `fx, fy, cx, cy, k1, k2, k3, k4`.
+    #[cfg_attr(feature = "serde", serde(rename = "OPENCV_FISHEYE"))]
     OpenCvFisheye,
     /// `FULL_OPENCV`: `fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6`.
+    #[cfg_attr(feature = "serde", serde(rename = "FULL_OPENCV"))]
     FullOpenCv,
     /// `SIMPLE_RADIAL_FISHEYE`: `f, cx, cy, k`.
     SimpleRadialFisheye,

@@ -6,6 +6,7 @@ use crate::RelativePose;
 
 /// Which model of the scene and the motion the matches support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Model {
     /// Points in space, a translation.
@@ -31,8 +32,10 @@ impl Model {
 
 /// Another pose that the matches may mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RunnerUp {
     /// The pose, in a scale of its own: its mean absolute depth is one as well.
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub pose: RelativePose,
     /// As [`Estimate::score`].
     pub score: f64,
@@ -45,10 +48,12 @@ pub struct RunnerUp {
 /// A rotation and a plane take a point to a point, which leaves two numbers a match; the essential matrix takes it to
 /// a line, which leaves one. So even a true plane has a larger median than the general model.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evidence {
     /// Under the best rotation without translation.
     pub rotation_px: f64,
     /// Under the best plane; infinite where none was found.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial::or_infinite"))]
     pub planar_px: f64,
     /// Under the essential matrix.
     pub general_px: f64,
@@ -56,13 +61,16 @@ pub struct Evidence {
 
 /// One pose from matches with outliers, and what is known of it.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimate {
     /// Which model the matches support.
     pub model: Model,
     /// The pose. The mean absolute depth of the inliers over both views is one, so that `|t_21|` is the parallax.
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub pose: RelativePose,
     /// Covariance of `(ω, t_21)`: the rotation vector in radians of the error `exp([ω]×) R_21`, in the frame of camera 2, and
     /// the translation.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial::rows"))]
     pub covariance: Matrix6<f64>,
     /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order.
     pub inliers: Vec<bool>,

@@ -8,6 +8,11 @@ use crate::{Camera, InputError, RelativePose};
 
 /// How an estimate is made. The defaults suit most pairs; the threshold has to be in the unit of the focal lengths.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct Options {
     /// Matches whose Sampson error is below this are inliers, in pixels of [`focal_lengths`](Self::focal_lengths).
     pub threshold: f64,

@@ -46,6 +46,7 @@ use crate::{Candidates, Correspondence};
 
 /// Which candidates a solver returns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Kinds {
     /// Every kind that the solver has: real solutions, real parts of complex ones, the rotation-only candidate.
     #[default]
@@ -108,6 +109,7 @@ pub trait PoseSolver {
 
 /// A solver chosen at run time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum SolverName {
     /// [`Quest`].
