@@ -7,6 +7,7 @@ mod candidate;
 mod errors;
 mod estimate;
 mod estimate_batch;
+mod estimate_result;
 mod pose;
 mod servo;
 mod solve;
@@ -29,9 +30,11 @@ mod _core {
         BadCamera, DegenerateInput, NoPose, NotFinite, QuestError, ShapeMismatch, TooFewMatches,
     };
     #[pymodule_export]
-    use crate::estimate::{_estimate, _runner_up, Estimate, RunnerUp, estimate};
+    use crate::estimate::estimate;
     #[pymodule_export]
     use crate::estimate_batch::{_estimate_batch, EstimateBatch, estimate_batch};
+    #[pymodule_export]
+    use crate::estimate_result::{_estimate, _runner_up, Estimate, RunnerUp};
     #[pymodule_export]
     use crate::servo::{CameraServo, Command, RobotServo};
     #[pymodule_export]

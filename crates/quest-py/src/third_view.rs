@@ -4,7 +4,8 @@ use pyo3::prelude::*;
 use quest_core::robust::{self, Options};
 
 use crate::errors;
-use crate::estimate::{Estimate, threshold_for};
+use crate::estimate::threshold_for;
+use crate::estimate_result::Estimate;
 use crate::solve::Views;
 
 /// The disagreement of the depths, that with the other pose, and the ratio of the lengths of the translations.
