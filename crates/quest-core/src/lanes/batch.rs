@@ -6,11 +6,12 @@ use super::essentials::Essentials;
 use super::frame::{Frame, frame};
 use super::geometry::{Vector3, dot, product, scaled};
 use super::instructions::{Instructions, Task, Token};
+use super::isolation::{self, Cells, Grid, MAX_ROOTS, Tables};
 use super::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
 use super::motion::Motion;
 use super::null_space::{Basis, null_space};
 use super::resultant::Resultant;
-use super::roots::{self, Cells, Grid, MAX_ROOTS, Root, Tables};
+use super::roots::{self, Root};
 use super::twice::{Twice, TwiceLanes, twice};
 use crate::solver::{Kinds, PoseSolver, Quest};
 use crate::{Candidates, Correspondence};
@@ -96,7 +97,7 @@ impl BatchSolver {
     }
 
     fn run(
-        &self,
+        self,
         rest: Rest,
         matches: &[Correspondence],
         samples: &[[u32; 5]],
@@ -279,7 +280,7 @@ fn solve_group<L: WordLanes>(
     let polynomial = resultant.polynomial(lanes);
     let mirrored = roots::mirrored::<L>(&polynomial);
     let cells = &mut space.cells;
-    roots::isolate(lanes, tables, &polynomial, &mirrored, &mut space.grid, cells);
+    isolation::isolate(lanes, tables, &polynomial, &mirrored, &mut space.grid, cells);
     let count = lanes.load(&cells.count.map(|n| n as f64));
 
     let mut is_complete = lanes.splat(NO_PARALLAX).less(frame.parallax);

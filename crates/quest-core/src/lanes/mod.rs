@@ -38,7 +38,8 @@
 //! | `cubics.rs` | ten cubics without the factor `p` |
 //! | `elimination.rs` | reduced to six rows |
 //! | `resultant.rs` | three equations linear in `x` and `y`, the polynomial of degree ten, the point of a root |
-//! | `roots.rs` | all real roots, and a second count of them by Sturm's theorem |
+//! | `isolation.rs` | a cell for each of its real roots |
+//! | `roots.rs` | the roots, and a second count of them by Sturm's theorem |
 //! | `motion.rs` | rotation and translation, Newton's iteration |
 //! | `batch.rs` | all of it, for groups of samples |
 //!
@@ -64,6 +65,7 @@ mod essentials;
 mod frame;
 mod geometry;
 mod instructions;
+mod isolation;
 mod lane;
 mod motion;
 mod null_space;
