@@ -20,7 +20,8 @@ use crate::algebra::cholesky;
 const UNIT_WEIGHT: f64 = 1e10;
 /// Points nearer than this to the plane z = 0 of the current camera, in the unit of length, count as not seen.
 const NEAREST: f64 = 1e-3;
-const MAX_STEPS: usize = 20;
+/// Steps of a fit from a candidate: seven are usual.
+pub(super) const MAX_STEPS: usize = 20;
 
 /// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +63,8 @@ pub(super) struct Workspace {
     trial: Vec<f64>,
     /// The squared residuals of the features in the last fit, by the noise; infinite where not seen.
     pub(super) squares: Vec<f64>,
+    /// How many steps the last fit took.
+    pub(super) steps: usize,
     hessian: Vec<f64>,
     /// The mixed block, a row a feature: six columns of the pose, and the gradient.
     mixed: Vec<[f64; 7]>,
@@ -80,6 +83,7 @@ impl Workspace {
             inverse_depths: vec![1.0; features],
             trial: vec![1.0; features],
             squares: vec![0.0; features],
+            steps: 0,
             hessian: vec![0.0; features * features],
             mixed: vec![[0.0; 7]; features],
             solved: vec![[0.0; 7]; features],
@@ -90,23 +94,21 @@ impl Workspace {
         }
     }
 
-    /// Fits from this pose and the reference's inverse depths.
-    pub(super) fn fit(&mut self, problem: &Problem<'_>, start: RelativePose) -> Option<Fitted> {
-        self.fit_from(problem, start, &problem.reference.inverse_depths)
-    }
-
-    /// The same from other inverse depths.
-    pub(super) fn fit_from(
+    /// Fits from this pose and these inverse depths, by at most so many steps.
+    pub(super) fn fit(
         &mut self,
         problem: &Problem<'_>,
         start: RelativePose,
         inverse_depths: &[f64],
+        most_steps: usize,
     ) -> Option<Fitted> {
+        self.steps = 0;
         self.inverse_depths.copy_from_slice(inverse_depths);
         let mut pose = start;
         let mut cost = self.linearise(problem, &pose)?;
         let mut damping = 0.0;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..most_steps {
+            self.steps += 1;
             let Some(step) = self.solve(problem.reference, damping) else {
                 damping = f64::max(10.0 * damping, 1e-4);
                 continue;
