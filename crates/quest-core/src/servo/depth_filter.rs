@@ -10,6 +10,8 @@
 //!
 //! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](super::PerFrame).
 
+use nalgebra::Matrix6;
+
 use super::FilterOptions;
 use super::estimate::{Estimate, HoldReason, PoseEstimator};
 use super::first_images::FirstImages;
@@ -25,9 +27,9 @@ pub(super) const MAX_HYPOTHESES: usize = 8;
 const HOPELESS: f64 = 30.0;
 /// No single image counts for more than this: the odds of 1 to 300,000 that a false one may cost the truth.
 pub(super) const MOST_OF_ONE_IMAGE: f64 = 25.0;
-/// Steps of a fit with a feature left out, to see which of them disturbs. The last pose is one image's motion away, and two or three
-/// steps lead from there to the minimum where the rest is right.
-const TRIAL_STEPS: usize = 5;
+/// Steps of a fit that is only to be compared: of the rivals of the best hypothesis, and with a feature left out. The last pose is one
+/// image's motion away; two or three steps lead from there to the minimum where depths and features are right.
+const FEW_STEPS: usize = 5;
 
 /// One answer to the first image, and what has become of it.
 #[derive(Clone, Debug)]
@@ -122,13 +124,14 @@ impl<S: PoseSource> DepthFilter<S> {
     }
 
     /// Whether the camera can have come from the last pose to this one.
-    fn is_reachable(&self, from: &RelativePose, to: &Fitted) -> bool {
+    fn is_reachable(&self, to: &RelativePose, covariance: &Matrix6<f64>) -> bool {
+        let from = &self.hypotheses[0].pose;
         let images = (self.missed + 1) as f64;
         let deviation = |first: usize| {
-            self.options.gate * (0..3).map(|k| to.covariance[(first + k, first + k)]).sum::<f64>().sqrt()
+            self.options.gate * (0..3).map(|k| covariance[(first + k, first + k)]).sum::<f64>().sqrt()
         };
-        let turn = from.rotation_error(&to.pose);
-        let way = (from.t_21 - to.pose.t_21).norm();
+        let turn = from.rotation_error(to);
+        let way = (from.t_21 - to.t_21).norm();
         turn <= images * self.options.largest_turn + deviation(0)
             && way <= images * self.options.largest_move + deviation(3)
     }
@@ -162,10 +165,12 @@ impl<S: PoseSource> DepthFilter<S> {
         }
         self.sigma = self.sigma_of_mean(1);
         let fitted = self.follow()?;
-        if !self.is_reachable(&self.hypotheses[0].pose, &fitted) && self.missed < 2 * self.options.patience {
+        let Hypothesis { workspace, reference, .. } = &mut self.hypotheses[0];
+        let covariance = workspace.covariance(reference).ok_or(HoldReason::Inconsistent)?;
+        if !self.is_reachable(&fitted.pose, &covariance) && self.missed < 2 * self.options.patience {
             return Err(HoldReason::Jump);
         }
-        Ok(self.accept(&fitted))
+        Ok(self.accept(&fitted, covariance))
     }
 
     /// The noise of a difference between the goal and the mean of so many images.
@@ -180,7 +185,7 @@ impl<S: PoseSource> DepthFilter<S> {
     /// Fits the image by every hypothesis and puts the best first.
     fn follow(&mut self) -> Result<Fitted, HoldReason> {
         for k in 0..self.count {
-            let fitted = self.fit(k, MAX_STEPS);
+            let fitted = self.fit(k, if k == 0 { MAX_STEPS } else { FEW_STEPS });
             self.hypotheses[k].fitted = fitted;
             if self.count > 1 {
                 let cost = fitted.map_or(f64::INFINITY, |fitted| fitted.cost);
@@ -213,7 +218,7 @@ impl<S: PoseSource> DepthFilter<S> {
             let mut best: Option<(f64, usize)> = None;
             for i in 0..self.frame.len() {
                 let Some(image) = self.frame[i].take() else { continue };
-                if let Some(fitted) = self.fit(0, TRIAL_STEPS)
+                if let Some(fitted) = self.fit(0, FEW_STEPS)
                     && best.is_none_or(|(cost, _)| fitted.cost < cost)
                 {
                     best = Some((fitted.cost, i));
@@ -223,7 +228,7 @@ impl<S: PoseSource> DepthFilter<S> {
             self.frame[best?.1] = None;
             if let Some(fitted) = self.fit(0, MAX_STEPS).filter(|f| self.passes(f.cost, self.seen())) {
                 for k in 1..self.count {
-                    self.hypotheses[k].fitted = self.fit(k, MAX_STEPS);
+                    self.hypotheses[k].fitted = self.fit(k, FEW_STEPS);
                 }
                 return Some(fitted);
             }
@@ -232,7 +237,7 @@ impl<S: PoseSource> DepthFilter<S> {
     }
 
     /// Takes over the pose, and lets the image add to the depths of every hypothesis that it fits.
-    fn accept(&mut self, fitted: &Fitted) -> Estimate {
+    fn accept(&mut self, fitted: &Fitted, covariance: Matrix6<f64>) -> Estimate {
         let (inliers, weight) = (self.seen(), self.options.frame_weight);
         let squares: f64 = self.hypotheses[0].workspace.squares.iter().filter(|s| s.is_finite()).sum();
         self.hypotheses[0].fitted = Some(*fitted);
@@ -247,7 +252,7 @@ impl<S: PoseSource> DepthFilter<S> {
         }
         Estimate {
             pose: fitted.pose,
-            covariance: fitted.covariance,
+            covariance,
             inliers,
             residual: self.sigma * (squares / (2 * inliers) as f64).sqrt(),
             alternatives: self.count,
