@@ -60,6 +60,7 @@ fn images() -> Vec<(&'static str, Image)> {
         ("all at one place", vec![Some([0.1, -0.2]); 6]),
         ("all at the principal point", vec![Some([0.0, 0.0]); 6]),
         ("on a line", (0..6).map(|k| Some([0.1 * f64::from(k), 0.05 * f64::from(k)])).collect()),
+        ("four, beyond the border", (0..6).map(|k| (k < 4).then_some([0.6, 0.1 * f64::from(k)])).collect()),
         ("two swapped", with(&|image| image.swap(0, 4))),
         ("all in another order", with(&|image| image.rotate_left(2))),
         ("mirrored", with(&|image| image.iter_mut().flatten().for_each(|p| p[0] = -p[0]))),
@@ -92,7 +93,7 @@ fn survives<E: PoseEstimator + Clone, L: ControlLaw + Clone>(
 #[test]
 fn bad_images_make_no_wild_command_and_good_ones_resume() {
     let limits = Safety::new(LIMITS);
-    let robot = Safety { border: Some(Border { left: -0.5, right: 0.5 }), ..limits };
+    let robot = Safety { border: Some(Border { left: -0.4, right: 0.4 }), ..limits };
     let fast = FreeCameraLaw { rate: 10.0, unit: 5.0 };
     for first_images in [1, 10] {
         for known in [false, true] {
