@@ -25,7 +25,7 @@ pub struct FilterOptions {
     /// The first so many images are averaged before the camera is told to move: the depths of the first pair decide the
     /// way, and the noise of these images can still be averaged away.
     pub first_images: usize,
-    /// After so many images without a pose the candidates are asked again.
+    /// After so many images without a pose the candidates are asked again. That takes several images too.
     pub patience: usize,
     /// For a robot that moves on a plane with a level camera: how exactly.
     pub plane: Option<Plane>,
