@@ -170,7 +170,7 @@ impl<S: PoseSource> DepthFilter<S> {
         if !self.is_reachable(&fitted.pose, &covariance) && self.missed < 2 * self.options.patience {
             return Err(HoldReason::Jump);
         }
-        Ok(self.accept(&fitted, covariance))
+        Ok(self.accept(&fitted, &covariance))
     }
 
     /// The noise of a difference between the goal and the mean of so many images.
@@ -237,7 +237,7 @@ impl<S: PoseSource> DepthFilter<S> {
     }
 
     /// Takes over the pose, and lets the image add to the depths of every hypothesis that it fits.
-    fn accept(&mut self, fitted: &Fitted, covariance: Matrix6<f64>) -> Estimate {
+    fn accept(&mut self, fitted: &Fitted, covariance: &Matrix6<f64>) -> Estimate {
         let (inliers, weight) = (self.seen(), self.options.frame_weight);
         let squares: f64 = self.hypotheses[0].workspace.squares.iter().filter(|s| s.is_finite()).sum();
         self.hypotheses[0].fitted = Some(*fitted);
@@ -252,7 +252,7 @@ impl<S: PoseSource> DepthFilter<S> {
         }
         Estimate {
             pose: fitted.pose,
-            covariance,
+            covariance: *covariance,
             inliers,
             residual: self.sigma * (squares / (2 * inliers) as f64).sqrt(),
             alternatives: self.count,
