@@ -9,17 +9,21 @@ use quest_benches::SEED;
 use quest_benches::statistics::{percentile, sorted};
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
-    Choice, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, Length, Limits, PerFrame, Plane,
-    PoseEstimator, Safety, Servo,
+    Choice, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw,
+    Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo,
 };
 use quest_core::solver::SolverName;
+use rand_chacha::ChaCha8Rng;
 
-/// The time of a step of the closed loop, by replaying the images of a robot's run.
+/// The time of a step of the closed loop, by replaying the images of runs.
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// How often the run is replayed; of each image the fastest counts
+    /// How often a run is replayed; of each image the fastest counts
     #[arg(long, default_value_t = 50)]
     rounds: usize,
+    /// How many runs from different starts; the slowest image is that of all
+    #[arg(long, default_value_t = 20)]
+    runs: u64,
     /// Seed of the features and the noise
     #[arg(long, default_value_t = SEED)]
     seed: u64,
@@ -28,69 +32,115 @@ struct Arguments {
 const LIMITS: Limits = Limits { speed: 0.5, turn_rate: 0.6 };
 /// Half a minute at 10 Hz.
 const IMAGES: usize = 300;
+const PLANE: Plane = Plane { tilt: 0.002, height: 0.001 };
 
 fn main() {
     let arguments = Arguments::parse();
-    println!("| features | estimator | µs an image, median | 98 % | slowest image | images with a pose |");
-    println!("|---:|---|{}", "---:|".repeat(4));
+    println!(
+        "| loop | estimator | µs an image, median | 98 % | first pose, median | most | slowest image | images with a pose |"
+    );
+    println!("|---|---|{}", "---:|".repeat(6));
     for features in [5, 20] {
-        let disturbances = Disturbances { noise_px: 0.5, rounded: true, ..Disturbances::default() };
-        let rng = &mut scenario::generator(arguments.seed, 0);
-        let (mut world, mut robot) =
-            scenario::random(Features::General, features, &disturbances, rng, |_| {
-                scenario::robot_start(Features::General)
-            });
+        for outliers in [0.0, 0.05] {
+            let images = Images { features, outliers };
+            let robot = |_: &mut ChaCha8Rng| scenario::robot_start(Features::General);
+            rows("robot", &arguments, &images, DifferentialDriveLaw::default(), Some(PLANE), robot);
+            let law = FreeCameraLaw { rate: 0.3, unit: 2.0 };
+            rows("arm", &arguments, &images, law, None, scenario::random_camera);
+        }
+    }
+}
+
+/// What the images show.
+struct Images {
+    features: usize,
+    /// The share of features that are somewhere else.
+    outliers: f64,
+}
+
+/// Both estimators on the images of the same runs.
+fn rows<P: Plant, L: ControlLaw + Clone>(
+    body: &str,
+    arguments: &Arguments,
+    shown: &Images,
+    law: L,
+    plane: Option<Plane>,
+    start: impl Fn(&mut ChaCha8Rng) -> P,
+) {
+    let Images { features, outliers } = *shown;
+    let disturbances = Disturbances { noise_px: 0.5, rounded: true, outliers, ..Disturbances::default() };
+    let (mut filtered, mut chosen) = (Times::default(), Times::default());
+    for run in 0..arguments.runs.max(1) {
+        let rng = &mut scenario::generator(arguments.seed, run);
+        let (mut world, mut plant) =
+            scenario::random(Features::General, features, &disturbances, rng, &start);
         world.goal_images = 30;
         let goal = world.on_plane(&world.goal_pixels(rng));
-        let options = FilterOptions {
-            plane: Some(Plane { tilt: 0.002, height: 0.001 }),
-            ..world.filter_options(&LIMITS, 2.0)
-        };
+        // As in the tables of the closed loop.
+        let min_features = if plane.is_some() && features < 20 { 4 } else { 5 };
+        let options = FilterOptions { plane, min_features, ..world.filter_options(&LIMITS, 2.0) };
         let filter = DepthFilter::new(&goal, SolverName::Quest, options);
-        let mut chosen = PerFrame::new(&goal, SolverName::Quest, Choice::Reprojection, Length::GoalDepths);
-        chosen.set_depths(&world.points.iter().map(|x| x.z).collect::<Vec<_>>());
+        let mut choice = PerFrame::new(&goal, SolverName::Quest, Choice::Reprojection, Length::GoalDepths);
+        choice.set_depths(&world.points.iter().map(|x| x.z).collect::<Vec<_>>());
+        let safety = Safety { border: plane.and(world.border(40.0)), ..Safety::new(LIMITS) };
+        let filter = Servo::new(&goal, filter, law.clone(), safety);
+        let choice = Servo::new(&goal, choice, law.clone(), safety);
         let mut images = Vec::new();
-        let mut servo = controller(&goal, filter.clone());
-        world.run(&mut robot, &mut servo, IMAGES, rng, |record| {
+        world.run(&mut plant, &mut filter.clone(), IMAGES, rng, |record| {
             images.push(record.features.clone());
             true
         });
-        let rounds = arguments.rounds;
-        report(features, "filter", &times(&controller(&goal, filter), &images, rounds));
-        report(features, "one candidate an image", &times(&controller(&goal, chosen), &images, rounds));
+        filtered.add(&filter, &images, arguments.rounds);
+        chosen.add(&choice, &images, arguments.rounds);
+    }
+    let disturbed =
+        if outliers > 0.0 { format!(", {:.0} % outliers", 100.0 * outliers) } else { String::new() };
+    let name = format!("{body}, {features} features{disturbed}");
+    filtered.report(&name, "filter");
+    if outliers == 0.0 {
+        chosen.report(&name, "one candidate an image");
     }
 }
 
-fn controller<E: PoseEstimator>(goal: &[[f64; 2]], estimator: E) -> Servo<E, DifferentialDriveLaw> {
-    Servo::new(goal, estimator, DifferentialDriveLaw::default(), Safety::new(LIMITS))
+/// Of every image its fastest µs, of every run those of the image with the first pose, and how many images had one.
+#[derive(Default)]
+struct Times {
+    all: Vec<f64>,
+    first: Vec<f64>,
+    poses: usize,
 }
 
-/// Of every image, its fastest µs, and how many of them had a pose.
-fn times<E: PoseEstimator + Clone>(
-    servo: &Servo<E, DifferentialDriveLaw>,
-    images: &[Vec<Option<[f64; 2]>>],
-    rounds: usize,
-) -> (Vec<f64>, usize) {
-    let mut fastest = vec![f64::INFINITY; images.len()];
-    let mut poses = 0;
-    for _ in 0..rounds.max(1) {
-        let mut servo = servo.clone();
-        poses = 0;
-        for (image, fastest) in images.iter().zip(&mut fastest) {
-            let start = Instant::now();
-            let step = black_box(servo.step(black_box(image)));
-            *fastest = fastest.min(1e6 * start.elapsed().as_secs_f64());
-            poses += usize::from(step.estimate.is_ok());
+impl Times {
+    fn add<E: PoseEstimator + Clone, L: ControlLaw + Clone>(
+        &mut self,
+        servo: &Servo<E, L>,
+        images: &[Vec<Option<[f64; 2]>>],
+        rounds: usize,
+    ) {
+        let mut fastest = vec![f64::INFINITY; images.len()];
+        let mut has_pose = vec![false; images.len()];
+        for _ in 0..rounds.max(1) {
+            let mut servo = servo.clone();
+            for (k, image) in images.iter().enumerate() {
+                let start = Instant::now();
+                let step = black_box(servo.step(black_box(image)));
+                fastest[k] = fastest[k].min(1e6 * start.elapsed().as_secs_f64());
+                has_pose[k] = step.estimate.is_ok();
+            }
         }
+        self.first.extend(has_pose.iter().position(|&has| has).map(|k| fastest[k]));
+        self.poses += has_pose.iter().filter(|&&has| has).count();
+        self.all.extend(fastest);
     }
-    (fastest, poses)
-}
 
-fn report(features: usize, estimator: &str, (times, poses): &(Vec<f64>, usize)) {
-    let times = sorted(times.iter().copied());
-    let [median, most, slowest] = [0.5, 0.98, 1.0].map(|p| percentile(&times, p));
-    println!(
-        "| {features} | {estimator} | {median:.1} | {most:.1} | {slowest:.1} | {poses} of {} |",
-        times.len()
-    );
+    fn report(&self, name: &str, estimator: &str) {
+        let (all, first) = (sorted(self.all.iter().copied()), sorted(self.first.iter().copied()));
+        let [median, most, slowest] = [0.5, 0.98, 1.0].map(|p| percentile(&all, p));
+        let [first_median, first_most] = [0.5, 1.0].map(|p| percentile(&first, p));
+        println!(
+            "| {name} | {estimator} | {median:.1} | {most:.1} | {first_median:.1} | {first_most:.1} | {slowest:.1} | {} of {} |",
+            self.poses,
+            all.len()
+        );
+    }
 }

@@ -47,7 +47,7 @@ impl Command {
 
     /// str : ``"tracking"``, or why the loop holds.
     ///
-    /// ``"starting"``: the first images are being averaged. ``"too_few_features"``, ``"degenerate"``: the features
+    /// ``"starting"``: the first images are being averaged, and their candidates tried. ``"too_few_features"``, ``"degenerate"``: the features
     /// determine no pose. ``"inconsistent"``: no pose explains them. ``"jump"``: the pose is further from the last
     /// one than the camera can have moved. ``"uncertain"``: its covariance is too large.
     #[getter]

@@ -36,9 +36,10 @@ fn every_image_is_a_row() {
     for name in ["true_qw", "x", "vz", "wy", "essential_tx", "homography_tx", "u20", "v20"] {
         assert!(column(&text, name).iter().all(is_number), "{name}");
     }
-    // The first images are averaged before there is a pose.
+    // The first ten images are averaged before there is a pose, and their candidates tried.
     let is_tracking: Vec<bool> = column(&text, "state").iter().map(|state| state == "tracking").collect();
-    assert_eq!(is_tracking.iter().position(|&t| t), Some(9));
+    let first = is_tracking.iter().position(|&t| t).unwrap();
+    assert!((10..40).contains(&first), "{first}");
     for name in ["qw", "tz"] {
         let has_pose: Vec<bool> = column(&text, name).iter().map(is_number).collect();
         assert_eq!(has_pose, is_tracking, "{name}");

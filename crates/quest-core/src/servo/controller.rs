@@ -66,8 +66,14 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         let estimate = self.estimator.estimate(features);
         let estimate =
             estimate.and_then(|e| if self.is_certain(&e) { Ok(e) } else { Err(HoldReason::Uncertain) });
-        let wanted = estimate.as_ref().map_or(Twist::zero(), |estimate| self.law.command(&estimate.pose));
-        let command = self.guarded(wanted, features);
+        let command = match &estimate {
+            Ok(estimate) => {
+                let wanted = self.law.command(&estimate.pose);
+                self.guarded(wanted, features)
+            }
+            // Nor does it turn features back from the border.
+            Err(_) => Twist::zero(),
+        };
         Step { command, estimate }
     }
 

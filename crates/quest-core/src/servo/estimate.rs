@@ -24,8 +24,8 @@ pub struct Estimate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HoldReason {
-    /// The first images are being averaged.
-    #[error("the first images are being averaged")]
+    /// The first images are being averaged, and their candidates tried.
+    #[error("the first images are being averaged, and their candidates tried")]
     Starting,
     /// Too few features of the goal are seen.
     #[error("too few features of the goal are seen")]

@@ -20,7 +20,8 @@ use crate::algebra::cholesky;
 const UNIT_WEIGHT: f64 = 1e10;
 /// Points nearer than this to the plane z = 0 of the current camera, in the unit of length, count as not seen.
 const NEAREST: f64 = 1e-3;
-const MAX_STEPS: usize = 20;
+/// Steps of a fit from a candidate: seven are usual.
+pub(super) const MAX_STEPS: usize = 20;
 
 /// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,8 +51,6 @@ pub(super) struct Fitted {
     pub(super) pose: RelativePose,
     /// The whole cost: χ² of the images and of the reference.
     pub(super) cost: f64,
-    /// Of a small rotation from the left, then of t.
-    pub(super) covariance: Matrix6<f64>,
 }
 
 /// The working memory of fits, for a number of features fixed at the start.
@@ -62,11 +61,15 @@ pub(super) struct Workspace {
     trial: Vec<f64>,
     /// The squared residuals of the features in the last fit, by the noise; infinite where not seen.
     pub(super) squares: Vec<f64>,
+    /// How many steps the last fit took.
+    pub(super) steps: usize,
     hessian: Vec<f64>,
     /// The mixed block, a row a feature: six columns of the pose, and the gradient.
     mixed: Vec<[f64; 7]>,
     solved: Vec<[f64; 7]>,
     step: Vec<f64>,
+    /// `Λ (ρ − ρ̂)`, the pull of the reference.
+    pulls: Vec<f64>,
     /// The diagonal block of the inverse depths, from the images alone.
     diagonal: Vec<f64>,
     /// The pose's block.
@@ -80,33 +83,34 @@ impl Workspace {
             inverse_depths: vec![1.0; features],
             trial: vec![1.0; features],
             squares: vec![0.0; features],
+            steps: 0,
             hessian: vec![0.0; features * features],
             mixed: vec![[0.0; 7]; features],
             solved: vec![[0.0; 7]; features],
             step: vec![0.0; features],
+            pulls: vec![0.0; features],
             diagonal: vec![0.0; features],
             pose_block: Matrix6::zeros(),
             gradient: Vector6::zeros(),
         }
     }
 
-    /// Fits from this pose and the reference's inverse depths.
-    pub(super) fn fit(&mut self, problem: &Problem<'_>, start: RelativePose) -> Option<Fitted> {
-        self.fit_from(problem, start, &problem.reference.inverse_depths)
-    }
-
-    /// The same from other inverse depths.
-    pub(super) fn fit_from(
+    /// Fits from this pose and these inverse depths, by at most so many steps.
+    pub(super) fn fit(
         &mut self,
         problem: &Problem<'_>,
         start: RelativePose,
         inverse_depths: &[f64],
+        most_steps: usize,
     ) -> Option<Fitted> {
+        self.steps = 0;
         self.inverse_depths.copy_from_slice(inverse_depths);
         let mut pose = start;
-        let mut cost = self.linearise(problem, &pose)?;
-        let mut damping = 0.0;
-        for _ in 0..MAX_STEPS {
+        let mut cost = self.cost(problem, &pose)?;
+        self.linearise(problem, &pose);
+        let (mut damping, mut is_refused) = (0.0, false);
+        for _ in 0..most_steps {
+            self.steps += 1;
             let Some(step) = self.solve(problem.reference, damping) else {
                 damping = f64::max(10.0 * damping, 1e-4);
                 continue;
@@ -117,12 +121,14 @@ impl Workspace {
             for ((new, old), by) in self.inverse_depths.iter_mut().zip(&kept).zip(&self.step) {
                 *new = old + by;
             }
-            let change = self.cost(problem, &moved).map(|new| cost - new);
-            match change {
-                Some(change) if change >= 0.0 => {
+            let new = self.cost(problem, &moved);
+            is_refused = new.is_none_or(|new| new > cost);
+            match new {
+                Some(new) if !is_refused => {
                     self.trial = kept;
-                    pose = moved;
-                    cost = self.linearise(problem, &pose)?;
+                    let change = cost - new;
+                    (pose, cost) = (moved, new);
+                    self.linearise(problem, &pose);
                     damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
                     if change <= 1e-4 * cost + 1e-9 {
                         break;
@@ -138,10 +144,11 @@ impl Workspace {
                 }
             }
         }
-        // The last trial may have been refused: the residuals are those of the pose that is returned.
-        self.cost(problem, &pose)?;
-        let covariance = self.marginal(problem.reference)?;
-        Some(Fitted { pose, cost, covariance })
+        if is_refused {
+            // The residuals are to be those of the pose that is returned.
+            self.cost(problem, &pose)?;
+        }
+        Some(Fitted { pose, cost })
     }
 
     /// The residuals and the cost, at the workspace's inverse depths; `None` where a seen point is behind the camera.
@@ -151,7 +158,8 @@ impl Workspace {
         let mut cost = plane.map_or(0.0, |plane| plane_residuals(&plane, pose).0.norm_squared());
         for (i, (m1, image)) in goal.iter().zip(frame).enumerate() {
             let rho = self.inverse_depths[i];
-            cost += reference.pull(i, &self.inverse_depths) * (rho - reference.inverse_depths[i]);
+            self.pulls[i] = reference.pull(i, &self.inverse_depths);
+            cost += self.pulls[i] * (rho - reference.inverse_depths[i]);
             self.squares[i] = f64::INFINITY;
             let Some(image) = image else { continue };
             let x2 = r_21 * Vector3::new(m1[0], m1[1], 1.0) + pose.t_21 * rho;
@@ -167,10 +175,9 @@ impl Workspace {
         cost.is_finite().then_some(cost)
     }
 
-    /// The normal equations at this pose and the workspace's inverse depths, and the cost.
-    fn linearise(&mut self, problem: &Problem<'_>, pose: &RelativePose) -> Option<f64> {
-        let cost = self.cost(problem, pose)?;
-        let Problem { goal, frame, reference, sigma, plane } = *problem;
+    /// The normal equations at this pose and the workspace's inverse depths, where the cost was the last time.
+    fn linearise(&mut self, problem: &Problem<'_>, pose: &RelativePose) {
+        let Problem { goal, frame, sigma, plane, .. } = *problem;
         let r_21 = pose.r_21();
         let drift: f64 = self.inverse_depths.iter().map(|rho| rho - 1.0).sum();
         (self.pose_block, self.gradient) = (Matrix6::zeros(), Vector6::zeros());
@@ -181,7 +188,7 @@ impl Workspace {
         }
         for (i, (m1, image)) in goal.iter().zip(frame).enumerate() {
             let rho = self.inverse_depths[i];
-            let pull = reference.pull(i, &self.inverse_depths) + UNIT_WEIGHT * drift;
+            let pull = self.pulls[i] + UNIT_WEIGHT * drift;
             (self.mixed[i], self.diagonal[i]) = ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, pull], 0.0);
             let Some(image) = image else { continue };
             let c = r_21 * Vector3::new(m1[0], m1[1], 1.0);
@@ -202,7 +209,6 @@ impl Workspace {
                 }
             }
         }
-        Some(cost)
     }
 
     /// The step of the pose; that of the inverse depths is left in `step`.
@@ -216,8 +222,9 @@ impl Workspace {
         step.iter().chain(&self.step).all(|s| s.is_finite()).then_some(step)
     }
 
-    /// The covariance of the pose, the inverse depths being as uncertain as they are.
-    fn marginal(&mut self, reference: &DepthReference) -> Option<Matrix6<f64>> {
+    /// The covariance of the last fit's pose, the inverse depths being as uncertain as they are: of a small rotation from the
+    /// left, then of t.
+    pub(super) fn covariance(&mut self, reference: &DepthReference) -> Option<Matrix6<f64>> {
         self.eliminate(reference, 0.0)?.0.cholesky().map(|schur| schur.inverse())
     }
 

@@ -49,6 +49,8 @@ mod controller;
 pub mod depth_filter;
 pub mod differential_drive;
 mod estimate;
+mod filter_options;
+mod first_images;
 mod fit;
 pub mod free_camera;
 mod imaging;
@@ -57,6 +59,7 @@ pub mod per_frame;
 pub mod plant;
 mod reference;
 pub mod scenario;
+mod search;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -64,9 +67,10 @@ mod twist;
 
 pub use closed_loop::{Record, World};
 pub use controller::{Border, Safety, Servo, Step};
-pub use depth_filter::{DepthFilter, FilterOptions};
+pub use depth_filter::DepthFilter;
 pub use differential_drive::{DifferentialDriveLaw, PlanarPose};
 pub use estimate::{Estimate, HoldReason, PoseEstimator};
+pub use filter_options::FilterOptions;
 pub use fit::Plane;
 pub use free_camera::FreeCameraLaw;
 pub use imaging::Disturbances;

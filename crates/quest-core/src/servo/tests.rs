@@ -1,9 +1,11 @@
 //! The closed loop.
 
+mod hostile;
+
 use super::scenario::{self, Features};
 use super::*;
-use crate::RelativePose;
 use crate::solver::SolverName;
+use crate::{Candidates, RelativePose};
 use rand_chacha::ChaCha8Rng;
 
 const LIMITS: Limits = Limits { speed: 0.5, turn_rate: 0.6 };
@@ -38,6 +40,16 @@ fn records<P: Plant, E: PoseEstimator, L: ControlLaw>(
     all
 }
 
+/// How many images a run without noise or with one first image starts with: one to find candidates in, and one at most for each of
+/// them. It stands still meanwhile.
+fn starting(records: &[Record]) -> usize {
+    let is_starting = |record: &&Record| record.step.estimate == Err(HoldReason::Starting);
+    let count = records.iter().take_while(is_starting).count();
+    assert!((1..=1 + Candidates::CAPACITY).contains(&count), "{count}");
+    assert!(records[..count].iter().all(|record| record.step.command == Twist::zero()));
+    count
+}
+
 fn harmonic_mean(world: &World) -> f64 {
     world.points.len() as f64 / world.points.iter().map(|x| 1.0 / x.z).sum::<f64>()
 }
@@ -54,6 +66,7 @@ fn the_paper_s_camera_arrives() {
         Safety::new(LIMITS),
     );
     let all = records(&world, &mut camera, servo, 1_400, rng);
+    let all = &all[starting(&all)..];
     let estimates: Vec<_> = all.iter().map(|r| r.step.estimate.unwrap().pose).collect();
     // (10.1), rounded as printed there, in the unit of the goal's depths.
     let unit = harmonic_mean(&world);
@@ -100,7 +113,7 @@ fn robots_arrive_without_noise_and_with_it() {
             let all = records(&world, &mut plant, servo, 500, rng);
             assert!(plant.x.hypot(plant.z) < 0.02, "{index}: {plant:?}");
             assert!(plant.heading.abs().to_degrees() < 1.0, "{index}: {plant:?}");
-            assert!(all.iter().all(|r| r.step.estimate.is_ok()), "{index}");
+            assert!(all[starting(&all)..].iter().all(|r| r.step.estimate.is_ok()), "{index}");
         }
     }
 }
@@ -149,7 +162,8 @@ fn lost_features_hold_and_found_ones_resume() {
         let goal = world.on_plane(&world.goal_pixels(rng));
         let law = DifferentialDriveLaw::default();
         let servo = Servo::new(&goal, filter(&world, &goal, Some(PLANE)), law, Safety::new(LIMITS));
-        for (index, record) in records(&world, &mut plant, servo, 500, rng).iter().enumerate() {
+        let all = records(&world, &mut plant, servo, 500, rng);
+        for (index, record) in all.iter().enumerate().skip(starting(&all)) {
             let Step { command, estimate } = &record.step;
             if (30..60).contains(&index) {
                 assert_eq!(estimate.unwrap_err(), HoldReason::TooFewFeatures);
@@ -159,36 +173,6 @@ fn lost_features_hold_and_found_ones_resume() {
             }
         }
         assert!(plant.x.hypot(plant.z) < 0.02 && plant.heading.abs() < 0.02, "{plant:?}");
-    }
-}
-
-/// Anything at all in place of an image: commands are finite and within the limits.
-#[test]
-fn no_image_makes_a_wild_command() {
-    use rand::RngExt;
-    let rng = &mut scenario::generator(5, 0);
-    for round in 0..20 {
-        let (world, _) = robot(rng, 6, &Disturbances { noise_px: 0.5, ..Disturbances::default() });
-        let goal = world.on_plane(&world.goal_pixels(rng));
-        let law = FreeCameraLaw { rate: 10.0, unit: 5.0 };
-        let mut servo = Servo::new(&goal, filter(&world, &goal, None), law, Safety::new(LIMITS));
-        for _ in 0..100 {
-            let mut coordinate = || match rng.random_range(0..12) {
-                0 => f64::NAN,
-                1 => f64::INFINITY,
-                2 => 1e300,
-                3 => 0.0,
-                _ => rng.random_range(-1.0..1.0),
-            };
-            let mut image: Vec<_> = (0..6).map(|_| Some([coordinate(), coordinate()])).collect();
-            if round % 2 == 0 {
-                image.pop();
-            }
-            let Step { command, estimate } = servo.step(&image);
-            assert!(command.is_finite());
-            assert!(command.linear.norm() <= LIMITS.speed && command.angular.norm() <= LIMITS.turn_rate);
-            assert!(estimate.is_ok() || command == Twist::zero());
-        }
     }
 }
 
@@ -202,11 +186,15 @@ fn a_clone_averages_the_first_images_too() {
     let mut copy = original.clone();
     let image: Vec<_> = world.points.iter().map(|x1| plant.pose().q_21 * x1 + plant.pose().t_21).collect();
     let image: Vec<_> = image.iter().map(|x2| Some([x2.x / x2.z, x2.y / x2.z])).collect();
-    for index in 0..12 {
+    let mut poses = 0;
+    for index in 0..40 {
         let expected = original.estimate(&image);
         assert_eq!(copy.estimate(&image), expected, "image {index}");
-        assert_eq!(expected.is_ok(), index >= 9, "image {index}: {expected:?}");
+        assert!(expected.is_ok() || expected == Err(HoldReason::Starting), "image {index}: {expected:?}");
+        assert!(expected.is_err() || index >= 9, "image {index}");
+        poses += usize::from(expected.is_ok());
     }
+    assert!(poses > 0);
 }
 
 /// Turning gives way to features at the border.
