@@ -1,5 +1,7 @@
 //! The features of `quest-core` that only add: `serde` and `mint`.
 
+use std::fmt::Debug;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use quest_core::robust::{self, Estimate, Options};
 use quest_core::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
@@ -10,9 +12,10 @@ use serde::de::DeserializeOwned;
 
 const SEED: u64 = 77;
 
-fn returns<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(x: &T) -> String {
-    let text = serde_json::to_string(x).unwrap();
-    assert_eq!(&serde_json::from_str::<T>(&text).unwrap(), x);
+/// What is written for it, which has to be read as the same.
+fn returns<T: Serialize + DeserializeOwned + PartialEq + Debug>(x: &T) -> String {
+    let text = serde_json::to_string(x).unwrap_or_default();
+    assert_eq!(serde_json::from_str(&text).ok().as_ref(), Some(x), "{text}");
     text
 }
 
@@ -53,8 +56,7 @@ fn names_are_those_of_files() {
     for model in CameraModel::ALL {
         same(returns(&model), model.name());
     }
-    use CandidateKind::{Exact, FromComplex, Planar, RotationOnly};
-    for kind in [Exact, FromComplex, RotationOnly, Planar] {
+    for kind in [CandidateKind::Exact, CandidateKind::FromComplex, CandidateKind::RotationOnly] {
         same(returns(&kind), kind.name());
     }
     for reason in [Degeneracy::TooFewMatches, Degeneracy::RankDeficient, Degeneracy::PureRotation] {

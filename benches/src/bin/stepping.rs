@@ -44,9 +44,9 @@ fn main() {
         for outliers in [0.0, 0.05] {
             let images = Images { features, outliers };
             let robot = |_: &mut ChaCha8Rng| scenario::robot_start(Features::General);
-            rows("robot", &arguments, &images, DifferentialDriveLaw::default(), Some(PLANE), robot);
+            rows("robot", &arguments, &images, &DifferentialDriveLaw::default(), Some(PLANE), robot);
             let law = FreeCameraLaw { rate: 0.3, unit: 2.0 };
-            rows("arm", &arguments, &images, law, None, scenario::random_camera);
+            rows("arm", &arguments, &images, &law, None, scenario::random_camera);
         }
     }
 }
@@ -63,7 +63,7 @@ fn rows<P: Plant, L: ControlLaw + Clone>(
     body: &str,
     arguments: &Arguments,
     shown: &Images,
-    law: L,
+    law: &L,
     plane: Option<Plane>,
     start: impl Fn(&mut ChaCha8Rng) -> P,
 ) {

@@ -29,8 +29,8 @@ impl TryFrom<PoseForm> for RelativePose {
     fn try_from(PoseForm { q_21: [w, x, y, z], t_21 }: PoseForm) -> Result<Self, String> {
         let q = Quaternion::new(w, x, y, z);
         let norm = q.norm();
-        // Written so that NaN is refused as well.
-        if !((norm - 1.0).abs() <= UNIT_TOLERANCE) {
+        let is_near_one = (norm - 1.0).abs() <= UNIT_TOLERANCE; // NaN is not.
+        if !is_near_one {
             return Err(format!("q_21 has the length {norm}, expected a unit quaternion w, x, y, z"));
         }
         if let Some(found) = t_21.iter().find(|c| !c.is_finite()) {
