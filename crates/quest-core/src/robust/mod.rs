@@ -28,6 +28,7 @@
 //! as fisheye cameras do, the same angle. Residuals are Sampson errors in pixels of the focal lengths.
 
 mod batch;
+mod columns;
 mod covariance;
 mod estimate;
 mod length;

@@ -73,7 +73,7 @@ pub(super) fn choose(
     let framed = observations.framed(inliers);
     let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals[i as usize].powi(2)).collect();
+    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals()[i as usize].powi(2)).collect();
     let transfer = |h: &Matrix3<f64>| -> Vec<f64> { framed.iter().map(|m| square_error(h, m)).collect() };
     let (rotation, planar) = (transfer(&r_21), plane.map(|plane| transfer(&plane.homography)));
     let excess = |model: &[f64], sigma: f64| {
