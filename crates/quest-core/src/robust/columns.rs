@@ -8,6 +8,7 @@
 use nalgebra::Matrix3;
 
 use super::observations::Image;
+use super::widest::{Work, widest};
 use crate::solver::motion::Motion;
 
 /// Matches that are worked on at once.
@@ -117,11 +118,27 @@ impl Columns {
         let view = View::new(self, e, motion);
         out.residuals.resize(self.len(), 0.0);
         out.sides.resize(self.len(), 0);
-        // As no product is fused with a sum, the result is the same with the vectors of any processor.
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || if self.is_sphere() { view.fill::<true>(self, out) } else { view.fill::<false>(self, out) },
-        );
+        widest(Looking { view: &view, columns: self, out });
+    }
+}
+
+/// A look at all columns.
+struct Looking<'a> {
+    view: &'a View,
+    columns: &'a Columns,
+    out: &'a mut Look,
+}
+
+impl Work for Looking<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        if self.columns.is_sphere() {
+            self.view.fill::<true>(self.columns, self.out);
+        } else {
+            self.view.fill::<false>(self.columns, self.out);
+        }
     }
 }
 

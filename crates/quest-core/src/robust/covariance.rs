@@ -67,9 +67,8 @@ pub(super) fn of_pose(
     let tangent = tangent_basis(&motion.direction);
     // The derivatives of the length hardly need all of the matches.
     let some = &inliers[..inliers.len().min(ENOUGH)];
-    let at = |steps: &[f64; 5]| {
-        length(observations, &motion.stepped(&tangent, steps), some, polished.sigma).value
-    };
+    let at =
+        |steps: &[f64; 5]| length(observations, &motion.stepped(&tangent, steps), some, polished.sigma).value;
     let here = at(&[0.0; 5]);
     let slope = Vector5::from_fn(|k, _| {
         let mut steps = [0.0; 5];

@@ -51,6 +51,7 @@ mod tests;
 mod third_view;
 mod transfer;
 mod verdict;
+mod widest;
 
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

@@ -13,6 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::columns::Columns;
+use super::transfer::Framed;
 use crate::Correspondence;
 use crate::degeneracy::nearly_on_a_line;
 use crate::epipolar_frame::tangent_basis;
@@ -113,12 +114,12 @@ impl Observations {
     }
 
     /// Some of the matches with the frames of both views.
-    pub(super) fn framed(&self, indices: &[u32]) -> Vec<FramedMatch> {
+    pub(super) fn framed(&self, indices: &[u32]) -> Framed {
         let framed = |&index: &u32| {
             let [x1, x2] = self.vectors(index as usize);
             FramedMatch { x1, x2, frame1: self.images[0].frame(&x1), frame2: self.images[1].frame(&x2) }
         };
-        indices.iter().map(framed).collect()
+        Framed::new(&indices.iter().map(framed).collect::<Vec<_>>())
     }
 }
 

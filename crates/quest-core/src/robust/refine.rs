@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Matrix5, Vector5};
 
 use super::columns::Columns;
 use super::loss::Loss;
+use super::widest::{Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::{Motion, damped_step};
 
@@ -74,20 +75,9 @@ impl Subset {
         let [d1, d2] = &self.inverse_scales;
         let f = fundamental(&motion.essential(), d1, d2);
         let df = derivatives.map(|de| fundamental(&de, d1, d2));
-        if self.is_sphere {
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.accumulate::<true>(&f, &df, loss),
-            )
-        } else {
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.accumulate::<false>(&f, &df, loss),
-            )
-        }
+        widest(Accumulation { subset: self, f, df, loss: *loss })
     }
 
-    /// Compiled for the widest vectors of the processor; as no product is fused with a sum, the result is the same on all.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "a call would leave the instructions it was dispatched to")]
     fn accumulate<const SPHERE: bool>(
@@ -144,6 +134,28 @@ impl Subset {
             cost: cost.iter().sum(),
             hessian,
             gradient: Vector5::from_fn(|a, _| gradient[a].iter().sum()),
+        }
+    }
+}
+
+/// The sums of the normal equations.
+struct Accumulation<'a, L> {
+    subset: &'a Subset,
+    f: [f64; 9],
+    df: [[f64; 9]; 5],
+    loss: L,
+}
+
+impl<L: Loss> Work for Accumulation<'_, L> {
+    type Output = Equations;
+
+    #[inline(always)]
+    fn run(self) -> Equations {
+        let Self { subset, f, df, loss } = self;
+        if subset.is_sphere {
+            subset.accumulate::<true>(&f, &df, &loss)
+        } else {
+            subset.accumulate::<false>(&f, &df, &loss)
         }
     }
 }

@@ -111,9 +111,7 @@ impl<'a> Search<'a> {
             let mut sample = [0; MAX_SAMPLE];
             let wanted = (enough - self.iterations).next_multiple_of(LANES).min(block);
             let left = limits.max_iterations - self.iterations;
-            while self.samples.len() < wanted.min(left)
-                && sampler.draw(&mut sample).is_some()
-            {
+            while self.samples.len() < wanted.min(left) && sampler.draw(&mut sample).is_some() {
                 self.samples.push(sample);
             }
             if self.samples.is_empty() {

@@ -19,7 +19,6 @@ use super::refine::{FINE, Subset, refine};
 use super::score::MANY;
 use super::search::Search;
 use super::significance::{self, is_significant};
-use super::transfer::square_error;
 use super::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
@@ -177,7 +176,8 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold).powi(2);
-        poses.inliers.retain(|&i| square_error(&r_21, &observations.framed(&[i])[0]) < limit);
+        let mut squares = observations.framed(&poses.inliers).square_errors(&r_21).into_iter();
+        poses.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
     }
     let inliers = poses.inliers.clone();
     let size = length(observations, &motion, &inliers, sigma);
