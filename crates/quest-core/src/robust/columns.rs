@@ -251,3 +251,78 @@ impl View {
         u32::from(is_far | (first & second)) | u32::from(is_far | (!first & !second)) << 1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robust::observations::Observations;
+    use crate::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
+    use crate::{Correspondence, RelativePose};
+
+    /// One block and a part of one; on the sphere where the bearings do not have `z = 1`.
+    fn observations(is_sphere: bool) -> (Observations, RelativePose) {
+        let options = SceneOptions { points: 13, noise_px: 2.0, ..SceneOptions::realistic() };
+        let scene = Scene::generate(&options, 43, 1).unwrap();
+        let unit = |m: &Correspondence| {
+            Correspondence::from_bearings((*m.bearing1()).into(), (*m.bearing2()).into()).unwrap()
+        };
+        let matches: Vec<_> =
+            if is_sphere { scene.matches.iter().map(unit).collect() } else { scene.matches };
+        let all = Observations::new(&matches, (0..13).collect(), [[FOCAL_LENGTH; 2]; 2]);
+        assert_eq!(all.columns.is_sphere(), is_sphere);
+        (all, scene.truth)
+    }
+
+    fn look(all: &Observations, motion: &Motion) -> Look {
+        let mut look = Look::default();
+        all.columns.look(&motion.essential(), motion, &mut look);
+        look
+    }
+
+    #[test]
+    fn residuals_are_sampson_errors() {
+        for is_sphere in [false, true] {
+            let (all, truth) = observations(is_sphere);
+            let motion = Motion { q_21: truth.q_21, direction: truth.t_21.normalize() };
+            let e = motion.essential();
+            for (m, r) in all.matches.iter().zip(look(&all, &motion).residuals) {
+                let [a, b] = [m.bearing1() / m.bearing1().z, m.bearing2() / m.bearing2().z];
+                let (line2, line1) = (e * a, e.tr_mul(&b));
+                let on_plane = b.dot(&line2) / (line2.xy().norm_squared() + line1.xy().norm_squared()).sqrt();
+                let expected = if is_sphere { truth.sampson_error(m) } else { on_plane.abs() };
+                // Rounding of products of order one, times the focal length.
+                assert!((r.abs() - FOCAL_LENGTH * expected).abs() < 1e-9, "{r} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_are_in_front_of_the_true_pose_alone() {
+        for is_sphere in [false, true] {
+            let (all, truth) = observations(is_sphere);
+            let motion = Motion { q_21: truth.q_21, direction: truth.t_21.normalize() };
+            let opposite = |m: Motion| Motion { direction: -m.direction, ..m };
+            let starts = [motion, opposite(motion), motion.twisted(), opposite(motion.twisted())];
+            for (k, start) in starts.iter().enumerate() {
+                let look = look(&all, start);
+                // Twice twisted is the rotation again.
+                let found: Vec<_> =
+                    (0..POSES).filter(|&pose| (0..13).all(|i| look.is_in_front(i, pose))).collect();
+                assert_eq!(found, [k]);
+            }
+        }
+    }
+
+    #[test]
+    fn shifted_matches_are_false() {
+        let (all, _) = observations(false);
+        let [x1, _, _, x2, _, _] = all.columns.all();
+        for (count, expected) in [(5, 5), (13, 13), (14, 26), (1_000, 13 * 12)] {
+            let shifted = all.columns.shifted(count);
+            assert_eq!(shifted.len(), expected);
+            let [y1, _, _, y2, _, _] = shifted.all();
+            let is_true = |k: usize| x1.iter().zip(x2).any(|(x1, x2)| (*x1, *x2) == (y1[k], y2[k]));
+            assert!(!(0..expected).any(is_true));
+        }
+    }
+}

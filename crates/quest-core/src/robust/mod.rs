@@ -31,6 +31,7 @@ mod batch;
 mod columns;
 mod covariance;
 mod estimate;
+mod framed;
 mod length;
 mod loss;
 mod model;

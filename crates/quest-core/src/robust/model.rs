@@ -14,12 +14,13 @@
 use nalgebra::UnitQuaternion;
 
 use super::estimate::{Evidence, Model};
+use super::framed::Framed;
 use super::loss::GemanMcClure;
 use super::observations::Observations;
 use super::plane::{CAP, Plane};
 use super::polish::SCALE;
 use super::pose_score::PoseScorer;
-use super::transfer::{Framed, refine_rotation};
+use super::transfer::refine_rotation;
 use crate::alignment::best_rotation;
 
 /// A rotation alone is enough below this.

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::columns::Columns;
-use super::transfer::Framed;
+use super::framed::Framed;
 use crate::Correspondence;
 use crate::degeneracy::nearly_on_a_line;
 use crate::epipolar_frame::tangent_basis;

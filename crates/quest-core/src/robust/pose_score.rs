@@ -33,7 +33,7 @@ pub(super) struct PoseScorer<'a> {
     /// The inlier threshold in pixels.
     pub(super) threshold: f64,
     /// The residuals of the pose that was scored last, in pixels, and on which side of the cameras its points are.
-    pub(super) look: Look,
+    look: Look,
     /// Its matches within the limit asked for that are in front of both cameras, in order.
     pub(super) inliers: Vec<u32>,
 }
