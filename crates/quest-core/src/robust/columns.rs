@@ -178,7 +178,6 @@ impl View {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call would leave the instructions it was dispatched to")]
     fn fill<const SPHERE: bool>(&self, columns: &Columns, out: &mut Look) {
         let chunks = columns.all.each_ref().map(|c| c.as_chunks::<WIDTH>());
         let (residuals, last_residuals) = out.residuals.as_chunks_mut::<WIDTH>();
@@ -205,7 +204,6 @@ impl View {
     /// With `b = D2 x2` and `c = R D1 x1`, `−(b × t) · (b × c)` and `−(c × t) · (b × c)` have the signs of the depths. In the
     /// twisted partner `c` is turned about `t` by 180°.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
     fn few<const SPHERE: bool>(
         &self,
         [x1, y1, z1, x2, y2, z2]: [&[f64; WIDTH]; 6],
@@ -243,7 +241,7 @@ impl View {
 
     /// One bit for a translation, one for the opposite one.
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn sides(&self, bc: f64, tb: f64, tc: f64, bb: f64, cc: f64) -> u32 {
         // |b × c|² / (|b|² |c|²); the difference has the digits that are needed at two pixels.
         let is_far = (bc > 0.0) & (bb * cc - bc * bc < self.parallel * (bb * cc));

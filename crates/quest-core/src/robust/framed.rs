@@ -108,7 +108,6 @@ pub(super) fn rows(m: &Matrix3<f64>) -> [f64; 9] {
 }
 
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
 pub(super) fn whitened(h: &[f64; 9], block: &Block) -> Whitened {
     let mut out = Whitened {
         residual: [[0.0; WIDTH]; 2],

@@ -95,10 +95,10 @@ impl<'a> PoseScorer<'a> {
             let r = r.abs();
             let is_in_front = self.look.is_in_front(i, pose);
             cost += if r < judged && !is_in_front { 1.0 } else { loss(r / reach, count) };
-            support += usize::from(is_in_front & (r < SUPPORT * self.threshold));
+            support += usize::from(is_in_front && r < SUPPORT * self.threshold);
             // Written in any case, which takes less time than to ask.
             self.inliers[found] = index;
-            found += usize::from(is_in_front & (r < limit));
+            found += usize::from(is_in_front && r < limit);
         }
         self.inliers.truncate(found);
         Scored { motion, cost, support }

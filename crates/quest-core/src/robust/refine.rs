@@ -79,7 +79,6 @@ impl Subset {
     }
 
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call would leave the instructions it was dispatched to")]
     fn accumulate<const SPHERE: bool>(
         &self,
         f: &[f64; 9],
@@ -162,7 +161,6 @@ impl<L: Loss> Work for Accumulation<'_, L> {
 
 /// The residuals of a few matches, and their derivatives by the entries of `F`, row by row.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
 fn linearised<const SPHERE: bool>(
     f: &[f64; 9],
     [x1, y1, z1, x2, y2, z2]: &[[f64; WIDTH]; 6],

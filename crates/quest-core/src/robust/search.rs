@@ -1,9 +1,10 @@
 //! The search: samples, hypotheses, scores, local optimisation, until enough samples have been drawn.
 //!
-//! A random sample without outliers still has the noise of five matches. So each hypothesis that beats the earlier ones
-//! is refined over its inliers (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM 2003); what it has to beat is
-//! the best hypothesis as it was before its refinement, which leaves more starts for refinement than the refined one
-//! would.
+//! A random sample without outliers still has the noise of five matches. So hypotheses that beat the earlier ones, of each
+//! block of samples the best, are refined over their inliers (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM
+//! 2003); what they have to beat is the best hypothesis as it was before its refinement, which leaves more starts for
+//! refinement than the refined one would. To refine every one that is better than those before it in its block finds
+//! poses no better.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -182,7 +183,9 @@ impl<'a> Search<'a> {
     /// Scores hypotheses, and refines the best of them where it is the best so far.
     fn consider(&mut self, hypotheses: &[Matrix3<f64>]) {
         if self.observations.len() < MANY {
-            hypotheses.iter().for_each(|e| self.consider_one_of_few(e));
+            for e in hypotheses {
+                self.consider_one_of_few(e);
+            }
             return;
         }
         let mut best = None;
