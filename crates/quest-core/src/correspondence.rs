@@ -147,12 +147,6 @@ impl Correspondence {
         self
     }
 
-    /// The match of this point of view 1 with the point of view 2 of another match.
-    pub(crate) fn with_view2_of(mut self, other: &Self) -> Self {
-        (self.bearing2, self.length2) = (other.bearing2, other.length2);
-        self
-    }
-
     /// The unit bearing in the frame of camera 1.
     #[must_use]
     #[inline]

@@ -9,11 +9,11 @@
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
 
+use super::columns::Columns;
 use super::length::{Length, length};
 use super::loss::{SquaredInfluence, Truncated};
 use super::observations::Observations;
 use super::polish::Polished;
-use super::pose_score::PoseScorer;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
@@ -31,13 +31,16 @@ fn of_motion(
     motion: &Motion,
     inliers: &[u32],
     polished: &Polished,
-    false_matches: &[Observations],
+    false_matches: &Columns,
 ) -> Option<Matrix5<f64>> {
-    let subset = Subset::new(observations, inliers);
-    let equations = subset.equations(observations, motion, &Truncated::new(f64::INFINITY));
+    let subset = Subset::new(&observations.columns, inliers);
+    let equations = subset.equations(motion, &Truncated::new(f64::INFINITY));
     let inverse = equations.hessian.cholesky()?.inverse();
     let outliers = (observations.len() - inliers.len()) as f64;
-    let pull = pull_of_a_match(false_matches, motion, polished) * outliers;
+    let mut pull = Matrix5::zeros();
+    if outliers > 0.0 {
+        pull = pull_of_a_match(false_matches, motion, polished) * outliers;
+    }
     let normal = polished.loss.of_normal(polished.sigma);
     let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
     let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
@@ -45,17 +48,10 @@ fn of_motion(
 }
 
 /// The mean of `ψ² J Jᵀ` over false matches, most of which are too far off to count.
-fn pull_of_a_match(false_matches: &[Observations], motion: &Motion, polished: &Polished) -> Matrix5<f64> {
-    let mut pull = Matrix5::zeros();
-    let mut all = 0_usize;
-    for some in false_matches {
-        let mut poses = PoseScorer::new(some, polished.limit);
-        poses.score(*motion, polished.limit);
-        let subset = Subset::new(some, &poses.inliers);
-        pull += subset.equations(some, motion, &SquaredInfluence(polished.loss)).hessian;
-        all += some.len();
-    }
-    pull / all.max(1) as f64
+fn pull_of_a_match(false_matches: &Columns, motion: &Motion, polished: &Polished) -> Matrix5<f64> {
+    let subset = Subset::new(false_matches, &false_matches.agreeing(motion, polished.limit));
+    let influence = SquaredInfluence(polished.loss);
+    subset.equations(motion, &influence).hessian / false_matches.len().max(1) as f64
 }
 
 /// The covariance of `(ω, t_21)` of a motion whose translation has this length.
@@ -65,19 +61,19 @@ pub(super) fn of_pose(
     inliers: &[u32],
     polished: &Polished,
     size: Length,
-    false_matches: &[Observations],
+    false_matches: &Columns,
 ) -> Option<Matrix6<f64>> {
     let five = of_motion(observations, motion, inliers, polished, false_matches)?;
     let tangent = tangent_basis(&motion.direction);
     // The derivatives of the length hardly need all of the matches.
     let some = &inliers[..inliers.len().min(ENOUGH)];
+    let at =
+        |steps: &[f64; 5]| length(observations, &motion.stepped(&tangent, steps), some, polished.sigma).value;
+    let here = at(&[0.0; 5]);
     let slope = Vector5::from_fn(|k, _| {
-        let at = |step: f64| {
-            let mut steps = [0.0; 5];
-            steps[k] = step;
-            length(observations, &motion.stepped(&tangent, &steps), some, polished.sigma).value
-        };
-        (at(STEP) - at(-STEP)) / (2.0 * STEP)
+        let mut steps = [0.0; 5];
+        steps[k] = STEP;
+        (at(&steps) - here) / STEP
     });
     let mut jacobian = SMatrix::<f64, 6, 5>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());

@@ -97,7 +97,6 @@ impl GemanMcClure {
 
 impl Loss for Truncated {
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         if square < self.square_limit { (square, 1.0) } else { (self.square_limit, 0.0) }
     }
@@ -105,7 +104,6 @@ impl Loss for Truncated {
 
 impl Loss for Biweight {
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let rest = (1.0 - square * self.inverse_square).max(0.0);
         (1.0 - rest * rest * rest, 3.0 * self.inverse_square * rest * rest)
@@ -114,7 +112,6 @@ impl Loss for Biweight {
 
 impl Loss for HeavyTailed {
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
         let root = share.sqrt();
@@ -124,7 +121,6 @@ impl Loss for HeavyTailed {
 
 impl Loss for SquaredInfluence {
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let (_, weight) = self.0.cost_and_weight(square);
         (0.0, square * weight * weight)
@@ -133,7 +129,6 @@ impl Loss for SquaredInfluence {
 
 impl Loss for GemanMcClure {
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "part of a loop that is vectorised as one")]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
         (square * share, share * share)

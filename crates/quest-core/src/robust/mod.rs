@@ -28,9 +28,23 @@
 //! as fisheye cameras do, the same angle. Residuals are Sampson errors in pixels of the focal lengths.
 
 mod batch;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
+mod columns;
 mod covariance;
 mod estimate;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
+mod framed;
 mod length;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
 mod loss;
 mod model;
 mod noise;
@@ -39,6 +53,10 @@ mod options;
 mod plane;
 mod polish;
 mod pose_score;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
 mod refine;
 mod sampling;
 mod score;
@@ -48,8 +66,17 @@ mod stopping;
 #[cfg(test)]
 mod tests;
 mod third_view;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
 mod transfer;
 mod verdict;
+#[expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that the loop was dispatched to"
+)]
+mod widest;
 
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

@@ -11,15 +11,16 @@
 //! the model holds, `F` is one: the second number is noise as the first (the idea of K. Kanatani's geometric information
 //! criterion, with a cap against false matches). Where it does not, `F` goes to the cap.
 
-use nalgebra::{Matrix3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 
 use super::estimate::{Evidence, Model};
+use super::framed::Framed;
 use super::loss::GemanMcClure;
-use super::observations::{FramedMatch, Observations};
+use super::observations::Observations;
 use super::plane::{CAP, Plane};
 use super::polish::SCALE;
 use super::pose_score::PoseScorer;
-use super::transfer::{refine_rotation, square_error};
+use super::transfer::refine_rotation;
 use crate::alignment::best_rotation;
 
 /// A rotation alone is enough below this.
@@ -73,9 +74,9 @@ pub(super) fn choose(
     let framed = observations.framed(inliers);
     let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals[i as usize].powi(2)).collect();
-    let transfer = |h: &Matrix3<f64>| -> Vec<f64> { framed.iter().map(|m| square_error(h, m)).collect() };
-    let (rotation, planar) = (transfer(&r_21), plane.map(|plane| transfer(&plane.homography)));
+    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals()[i as usize].powi(2)).collect();
+    let rotation = framed.square_errors(&r_21);
+    let planar = plane.map(|plane| framed.square_errors(&plane.homography));
     let excess = |model: &[f64], sigma: f64| {
         let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
         (capped(model) - capped(&general)) / inliers.len().max(1) as f64
@@ -103,11 +104,11 @@ pub(super) fn choose(
 fn rotation_alone(
     observations: &Observations,
     inliers: &[u32],
-    framed: &[FramedMatch],
+    framed: &Framed,
     q_21: &UnitQuaternion<f64>,
     sigma: f64,
 ) -> UnitQuaternion<f64> {
-    let some = &framed[..framed.len().min(FITTED)];
+    let some = &observations.framed(&inliers[..inliers.len().min(FITTED)]);
     let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
     let wide = GemanMcClure::new(2.0 * SCALE * sigma);
     let starts = [*q_21, best_rotation(&matches)].map(|mut q| {
@@ -116,7 +117,7 @@ fn rotation_alone(
     });
     let mut q = if starts[1].1 < starts[0].1 { starts[1].0 } else { starts[0].0 };
     let r_21 = q.to_rotation_matrix().into_inner();
-    let squares = some.iter().map(|m| (square_error(&r_21, m) / (sigma * sigma)).min(CAP));
+    let squares = some.square_errors(&r_21).into_iter().map(|s| (s / (sigma * sigma)).min(CAP));
     if squares.sum::<f64>() < HOPELESS * some.len() as f64 {
         refine_rotation(framed, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
     }

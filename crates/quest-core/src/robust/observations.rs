@@ -12,6 +12,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::columns::Columns;
+use super::framed::Framed;
 use crate::Correspondence;
 use crate::degeneracy::nearly_on_a_line;
 use crate::epipolar_frame::tangent_basis;
@@ -54,8 +56,8 @@ pub(super) struct Observations {
     pub(super) order: Vec<usize>,
     /// The two views, both planes or both spheres.
     pub(super) images: [Image; 2],
-    /// `x1` and `x2`, six columns.
-    columns: [Vec<f64>; 6],
+    /// The same matches in columns.
+    pub(super) columns: Columns,
 }
 
 impl Observations {
@@ -68,16 +70,6 @@ impl Observations {
         });
         let images = focal_lengths
             .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
-        Self::in_images(matches, order, images)
-    }
-
-    /// Other matches in the same images.
-    pub(super) fn with_matches(&self, matches: Vec<Correspondence>) -> Self {
-        let order = (0..matches.len()).collect();
-        Self::in_images(matches, order, self.images)
-    }
-
-    fn in_images(matches: Vec<Correspondence>, order: Vec<usize>, images: [Image; 2]) -> Self {
         let mut columns: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(matches.len()));
         for m in &matches {
             let x1 = images[0].scaled(m.bearing1());
@@ -86,6 +78,7 @@ impl Observations {
                 column.push(*x);
             }
         }
+        let columns = Columns::new(images, columns);
         Self { matches, order, images, columns }
     }
 
@@ -94,31 +87,13 @@ impl Observations {
     }
 
     pub(super) fn is_sphere(&self) -> bool {
-        matches!(self.images[0], Image::Sphere(_))
+        self.columns.is_sphere()
     }
 
     /// `F = D2 E D1`, of unit norm.
     pub(super) fn fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
-        self.unscaled_fundamental(e).normalize()
-    }
-
-    /// `F = D2 E D1`.
-    pub(super) fn unscaled_fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
         let [d1, d2] = self.images.map(Image::inverse_scale);
-        Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j])
-    }
-
-    /// The six columns.
-    pub(super) fn columns(&self) -> &[Vec<f64>; 6] {
-        &self.columns
-    }
-
-    /// The curvature of the images: `1/f²` on a sphere, zero on a plane.
-    pub(super) fn curvature(&self) -> [f64; 2] {
-        self.images.map(|image| match image {
-            Image::Plane(_) => 0.0,
-            Image::Sphere(f) => 1.0 / (f * f),
-        })
+        Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j]).normalize()
     }
 
     /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
@@ -128,7 +103,7 @@ impl Observations {
 
     /// The squared angle, in radians, that a pixel in both views stands for.
     pub(super) fn square_angle_of_pixel(&self) -> f64 {
-        self.images.iter().map(|image| 1.0 / image.square_focal_length()).sum()
+        self.columns.square_angle_of_pixel()
     }
 
     /// A match as vectors on the planes `z = 1`, or as unit bearings.
@@ -139,32 +114,12 @@ impl Observations {
     }
 
     /// Some of the matches with the frames of both views.
-    pub(super) fn framed(&self, indices: &[u32]) -> Vec<FramedMatch> {
+    pub(super) fn framed(&self, indices: &[u32]) -> Framed {
         let framed = |&index: &u32| {
             let [x1, x2] = self.vectors(index as usize);
             FramedMatch { x1, x2, frame1: self.images[0].frame(&x1), frame2: self.images[1].frame(&x2) }
         };
-        indices.iter().map(framed).collect()
-    }
-
-    /// The signed Sampson error of every match in pixels.
-    pub(super) fn residuals(&self, e: &Matrix3<f64>, out: &mut Vec<f64>) {
-        let f = self.fundamental(e);
-        let curvature = self.curvature();
-        out.clear();
-        let [x1, y1, z1, x2, y2, z2] = &self.columns;
-        let is_sphere = self.is_sphere();
-        out.extend((0..self.len()).map(|i| {
-            let (x1, x2) = (Vector3::new(x1[i], y1[i], z1[i]), Vector3::new(x2[i], y2[i], z2[i]));
-            let (l, m) = (f * x1, f.tr_mul(&x2));
-            let e = x2.dot(&l);
-            let mut square = l.xy().norm_squared() + m.xy().norm_squared();
-            if is_sphere {
-                square += l.z * l.z + m.z * m.z - e * e * (curvature[0] + curvature[1]);
-            }
-            // At an epipole both vanish: no point there contradicts the motion.
-            e / square.max(f64::MIN_POSITIVE).sqrt()
-        }));
+        Framed::new(&indices.iter().map(framed).collect::<Vec<_>>())
     }
 }
 
@@ -176,14 +131,14 @@ impl Image {
         }
     }
 
-    fn inverse_scale(self) -> [f64; 3] {
+    pub(super) fn inverse_scale(self) -> [f64; 3] {
         match self {
             Self::Plane([fx, fy]) => [1.0 / fx, 1.0 / fy, 1.0],
             Self::Sphere(f) => [1.0 / f; 3],
         }
     }
 
-    fn square_focal_length(self) -> f64 {
+    pub(super) fn square_focal_length(self) -> f64 {
         match self {
             Self::Plane([fx, fy]) => fx * fy,
             Self::Sphere(f) => f * f,

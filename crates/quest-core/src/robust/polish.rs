@@ -3,7 +3,7 @@
 use super::loss::{HeavyTailed, Truncated};
 use super::noise;
 use super::pose_score::{PoseScorer, Scored};
-use super::refine::{Subset, refine};
+use super::refine::{FINE, Subset, refine};
 use crate::solver::motion::Motion;
 
 /// Steps of each refinement.
@@ -43,8 +43,8 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     let mut motion = start;
     if poses.inliers.len() >= FEWEST {
         let some = poses.inliers.len().min(ENOUGH);
-        let subset = Subset::new(poses.observations, &poses.inliers[..some]);
-        refine(poses.observations, &subset, &mut motion, &Truncated::new(threshold), STEPS);
+        let subset = Subset::new(&poses.observations.columns, &poses.inliers[..some]);
+        refine(&subset, &mut motion, &Truncated::new(threshold), FINE, STEPS);
         take_better(poses, &mut best, motion);
     }
     let shown = sigma(poses, &best.motion);
@@ -53,8 +53,8 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     poses.score(best.motion, limit);
     if poses.inliers.len() >= FEWEST {
         let mut motion = best.motion;
-        let subset = Subset::new(poses.observations, &poses.inliers);
-        refine(poses.observations, &subset, &mut motion, &loss, STEPS);
+        let subset = Subset::new(&poses.observations.columns, &poses.inliers);
+        refine(&subset, &mut motion, &loss, FINE, STEPS);
         let scored = poses.best_pose(&motion.essential(), threshold);
         best = scored.unwrap_or(best);
     }
@@ -73,5 +73,5 @@ fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
 /// The noise of the inliers of a pose; leaves its inliers in `poses`.
 fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
     poses.score(*motion, poses.threshold);
-    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals[i as usize]), poses.threshold)
+    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals()[i as usize]), poses.threshold)
 }

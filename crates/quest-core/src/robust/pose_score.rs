@@ -1,18 +1,12 @@
 //! The score of a pose, not only of its essential matrix: points behind a camera are outliers.
-//!
-//! An essential matrix has four poses. They are told apart by the depths of the points, and depths are noise where the
-//! rays of a match subtend less than the noise: such a match only has to look the same way in both views. Without
-//! this a vote rejects the true rotation of a camera that hardly moves.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
+use super::columns::{Look, POSES};
 use super::observations::Observations;
 use super::score::{REACH, loss};
 use crate::solver::essential::decompose;
 use crate::solver::motion::Motion;
-
-/// Rays closer than this, in pixels of both views, have no depth.
-const DISPARITY: f64 = 2.0;
 
 /// The stopping rule counts matches up to this multiple of the threshold: counted at the threshold itself a pose that is
 /// not refined to the end looks worse than it is, and the search goes on for nothing.
@@ -38,15 +32,15 @@ pub(super) struct PoseScorer<'a> {
     pub(super) observations: &'a Observations,
     /// The inlier threshold in pixels.
     pub(super) threshold: f64,
-    /// The residuals of the pose that was scored last, in pixels.
-    pub(super) residuals: Vec<f64>,
+    /// The residuals of the pose that was scored last, in pixels, and on which side of the cameras its points are.
+    look: Look,
     /// Its matches within the limit asked for that are in front of both cameras, in order.
     pub(super) inliers: Vec<u32>,
 }
 
 impl<'a> PoseScorer<'a> {
     pub(super) fn new(observations: &'a Observations, threshold: f64) -> Self {
-        Self { observations, threshold, residuals: Vec::new(), inliers: Vec::new() }
+        Self { observations, threshold, look: Look::default(), inliers: Vec::new() }
     }
 
     /// The best of the four poses of an essential matrix. [`Self::inliers`] are those within `limit` pixels.
@@ -57,101 +51,56 @@ impl<'a> PoseScorer<'a> {
             q_21: UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)),
             direction: Vector3::from(t).normalize(),
         };
-        self.observations.residuals(e, &mut self.residuals);
-        let motion = self.vote(&motion, limit);
-        Some(self.finish(motion, limit))
+        self.observations.columns.look(e, &motion, &mut self.look);
+        let pose = self.vote(limit);
+        let motion = if pose < 2 { motion } else { motion.twisted() };
+        let direction = if pose.is_multiple_of(2) { motion.direction } else { -motion.direction };
+        Some(self.finish(Motion { direction, ..motion }, pose, limit))
     }
 
     /// The score of one pose.
     pub(super) fn score(&mut self, motion: Motion, limit: f64) -> Scored {
-        self.observations.residuals(&motion.essential(), &mut self.residuals);
-        self.finish(motion, limit)
+        self.observations.columns.look(&motion.essential(), &motion, &mut self.look);
+        self.finish(motion, 0, limit)
+    }
+
+    /// The residuals of the pose that was scored last, in pixels.
+    pub(super) fn residuals(&self) -> &[f64] {
+        &self.look.residuals
     }
 
     /// The one of the four poses with most matches in front of both cameras.
-    fn vote(&self, motion: &Motion, limit: f64) -> Motion {
+    fn vote(&self, limit: f64) -> usize {
         let limit = limit.max(REACH * self.threshold);
-        let poses = [*motion, motion.twisted()].map(|motion| {
-            let voters = (0..self.residuals.len()).filter(|&i| self.residuals[i].abs() < limit);
-            let mut votes = [0_usize; 2];
-            let depth = self.depth_test(&motion);
-            for i in voters.take(MAX_VOTES) {
-                let side = depth(i);
-                votes[0] += usize::from(side != Side::Behind && side != Side::Mixed);
-                votes[1] += usize::from(side != Side::InFront && side != Side::Mixed);
-            }
-            (motion, votes)
-        });
-        let (mut best, mut most) = (poses[0].0, None);
-        for (motion, votes) in poses {
-            for (count, sign) in votes.into_iter().zip([1.0, -1.0]) {
-                if most.is_none_or(|most| count > most) {
-                    most = Some(count);
-                    best = Motion { direction: motion.direction * sign, ..motion };
-                }
+        let residuals = self.residuals();
+        let voters = (0..residuals.len()).filter(|&i| residuals[i].abs() < limit);
+        let mut votes = [0_usize; POSES];
+        for i in voters.take(MAX_VOTES) {
+            for (pose, votes) in votes.iter_mut().enumerate() {
+                *votes += usize::from(self.look.is_in_front(i, pose));
             }
         }
-        best
+        // The first of equals.
+        (1..POSES).fold(0, |best, pose| if votes[pose] > votes[best] { pose } else { best })
     }
 
-    fn finish(&mut self, motion: Motion, limit: f64) -> Scored {
+    /// The score of a pose of the motion that was looked at, `motion` itself.
+    fn finish(&mut self, motion: Motion, pose: usize, limit: f64) -> Scored {
         let reach = REACH * self.threshold;
-        let mut inliers = std::mem::take(&mut self.inliers);
-        inliers.clear();
-        let (mut cost, mut support) = (0.0, 0);
-        let depth = self.depth_test(&motion);
-        for (i, (index, r)) in (0_u32..).zip(&self.residuals).enumerate() {
-            let loss = loss(r / reach, self.residuals.len());
-            if r.abs() >= limit.max(reach) {
-                cost += loss;
-            } else if matches!(depth(i), Side::InFront | Side::Far) {
-                cost += loss;
-                support += usize::from(r.abs() < SUPPORT * self.threshold);
-                if r.abs() < limit {
-                    inliers.push(index);
-                }
-            } else {
-                cost += 1.0;
-            }
+        let judged = limit.max(reach);
+        let count = self.look.residuals.len();
+        let (mut cost, mut support, mut found) = (0.0, 0, 0);
+        self.inliers.resize(count, 0);
+        for (i, (index, r)) in (0_u32..).zip(&self.look.residuals).enumerate() {
+            let r = r.abs();
+            let is_in_front = self.look.is_in_front(i, pose);
+            cost += if r < judged && !is_in_front { 1.0 } else { loss(r / reach, count) };
+            support += usize::from(is_in_front && r < SUPPORT * self.threshold);
+            // Written in any case, which takes less time than to ask.
+            self.inliers[found] = index;
+            found += usize::from(is_in_front && r < limit);
         }
-        self.inliers = inliers;
+        self.inliers.truncate(found);
         Scored { motion, cost, support }
     }
-
-    /// On which side of the cameras a match is.
-    fn depth_test(&self, motion: &Motion) -> impl Fn(usize) -> Side + use<'a> {
-        let observations = self.observations;
-        let r_21 = motion.q_21.to_rotation_matrix().into_inner();
-        let t = motion.direction;
-        let parallel = DISPARITY * DISPARITY * observations.square_angle_of_pixel();
-        move |index| {
-            let m = &observations.matches[index];
-            let (b, c) = (m.bearing2(), r_21 * m.bearing1());
-            let bc = b.dot(&c);
-            // |b × c|² of unit vectors; the difference has the digits that are needed at two pixels.
-            if bc > 0.0 && 1.0 - bc * bc < parallel {
-                return Side::Far;
-            }
-            // −(b × t) · (b × c) and −(c × t) · (b × c): the depths before their division by |b × c|².
-            let (tb, tc) = (t.dot(b), t.dot(&c));
-            match (bc * tb - tc > 0.0, tb - bc * tc > 0.0) {
-                (true, true) => Side::InFront,
-                (false, false) => Side::Behind,
-                _ => Side::Mixed,
-            }
-        }
-    }
-}
-
-/// Where the point of a match is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    /// In front of both cameras.
-    InFront,
-    /// Behind both: in front of them with the opposite translation.
-    Behind,
-    /// In front of one, behind the other.
-    Mixed,
-    /// Too far to tell.
-    Far,
 }

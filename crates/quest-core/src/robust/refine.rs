@@ -6,28 +6,40 @@
 
 use nalgebra::{Matrix3, Matrix5, Vector5};
 
+use super::columns::Columns;
 use super::loss::Loss;
-use super::observations::Observations;
+use super::widest::{Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::{Motion, damped_step};
 
 /// Matches that are worked on at once.
-const WIDTH: usize = 4;
+const WIDTH: usize = 8;
+
+/// A descent is at its end when the next step gains no more than this, in units of the mean cost of a match, which is about
+/// half the variance of what noise leaves undetermined. That step is made, and needs no check.
+pub(super) const FINE: f64 = 1e-4;
+/// Near enough to a minimum to begin another descent there.
+pub(super) const COARSE: f64 = 1e-2;
 
 /// A step shorter than this (radians) moves nothing that can be measured.
 const SHORT: f64 = 1e-8;
 
-/// A gain smaller than this share of the cost moves the motion by a small part of its deviation.
-const SMALL_GAIN: f64 = 1e-6;
-
 /// Some of the matches, in columns of their own.
 #[derive(Clone, Debug)]
 pub(super) struct Subset {
-    columns: [Vec<f64>; 6],
-    /// One for a match, zero for padding.
-    weights: Vec<f64>,
+    blocks: Vec<Block>,
+    len: usize,
+    inverse_scales: [[f64; 3]; 2],
     curvature: f64,
     is_sphere: bool,
+}
+
+/// A few matches, the last of all repeated where there are fewer.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    columns: [[f64; WIDTH]; 6],
+    /// One for a match, zero for a repeated one.
+    live: [f64; WIDTH],
 }
 
 /// The normal equations of a step.
@@ -39,59 +51,45 @@ pub(super) struct Equations {
 }
 
 impl Subset {
-    pub(super) fn new(observations: &Observations, indices: &[u32]) -> Self {
-        let padding = indices.len().next_multiple_of(WIDTH) - indices.len();
-        let columns = observations.columns().each_ref().map(|column| {
-            let last = indices.last().map(|&i| column[i as usize]);
-            let padding = std::iter::repeat_n(last.unwrap_or_default(), padding);
-            indices.iter().map(|&i| column[i as usize]).chain(padding).collect()
-        });
-        let mut weights = vec![1.0; indices.len()];
-        weights.resize(indices.len() + padding, 0.0);
-        let [k1, k2] = observations.curvature();
-        Self { columns, weights, curvature: k1 + k2, is_sphere: observations.is_sphere() }
-    }
-
-    /// The cost of a motion and the normal equations of a step from it.
-    pub(super) fn equations(
-        &self,
-        observations: &Observations,
-        motion: &Motion,
-        loss: &impl Loss,
-    ) -> Equations {
-        let f = observations.unscaled_fundamental(&motion.essential());
-        let derivatives = motion.essential_derivatives(&tangent_basis(&motion.direction));
-        let df = derivatives.map(|de| row_by_row(&observations.unscaled_fundamental(&de)));
-        let f = row_by_row(&f);
-        if self.is_sphere {
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.accumulate::<true>(&f, &df, loss),
-            )
-        } else {
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || self.accumulate::<false>(&f, &df, loss),
-            )
+    pub(super) fn new(all: &Columns, indices: &[u32]) -> Self {
+        let columns = all.all();
+        let block = |some: &[u32]| {
+            let index = |j: usize| some[j.min(some.len() - 1)] as usize;
+            Block {
+                columns: std::array::from_fn(|k| std::array::from_fn(|j| columns[k][index(j)])),
+                live: std::array::from_fn(|j| if j < some.len() { 1.0 } else { 0.0 }),
+            }
+        };
+        Self {
+            blocks: indices.chunks(WIDTH).map(block).collect(),
+            len: indices.len(),
+            inverse_scales: all.inverse_scales(),
+            curvature: all.curvature(),
+            is_sphere: all.is_sphere(),
         }
     }
 
-    /// Compiled for the widest vectors of the processor; as no product is fused with a sum, the result is the same on all.
+    /// The cost of a motion and the normal equations of a step from it.
+    pub(super) fn equations(&self, motion: &Motion, loss: &impl Loss) -> Equations {
+        let derivatives = motion.essential_derivatives(&tangent_basis(&motion.direction));
+        let [d1, d2] = &self.inverse_scales;
+        let f = fundamental(&motion.essential(), d1, d2);
+        let df = derivatives.map(|de| fundamental(&de, d1, d2));
+        widest(Accumulation { subset: self, f, df, loss: *loss })
+    }
+
     #[inline(always)]
-    #[expect(clippy::inline_always, reason = "a call would leave the instructions it was dispatched to")]
     fn accumulate<const SPHERE: bool>(
         &self,
         f: &[f64; 9],
         df: &[[f64; 9]; 5],
         loss: &impl Loss,
     ) -> Equations {
-        let columns = self.columns.each_ref().map(|c| c.as_chunks::<WIDTH>().0);
         let mut cost = [0.0; WIDTH];
         let mut upper = [[0.0; WIDTH]; 15];
         let mut gradient = [[0.0; WIDTH]; 5];
-        for (i, live) in self.weights.as_chunks::<WIDTH>().0.iter().enumerate() {
-            let points = columns.map(|c| &c[i]);
-            let (residual, slope) = linearised::<SPHERE>(f, points, self.curvature);
+        for Block { columns, live } in &self.blocks {
+            let (residual, slope) = linearised::<SPHERE>(f, columns, self.curvature);
             let mut weight = [0.0; WIDTH];
             for j in 0..WIDTH {
                 let (c, w) = loss.cost_and_weight(residual[j] * residual[j]);
@@ -139,12 +137,33 @@ impl Subset {
     }
 }
 
+/// The sums of the normal equations.
+struct Accumulation<'a, L> {
+    subset: &'a Subset,
+    f: [f64; 9],
+    df: [[f64; 9]; 5],
+    loss: L,
+}
+
+impl<L: Loss> Work for Accumulation<'_, L> {
+    type Output = Equations;
+
+    #[inline(always)]
+    fn run(self) -> Equations {
+        let Self { subset, f, df, loss } = self;
+        if subset.is_sphere {
+            subset.accumulate::<true>(&f, &df, &loss)
+        } else {
+            subset.accumulate::<false>(&f, &df, &loss)
+        }
+    }
+}
+
 /// The residuals of a few matches, and their derivatives by the entries of `F`, row by row.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "the loop around it is vectorised only as one")]
 fn linearised<const SPHERE: bool>(
     f: &[f64; 9],
-    [x1, y1, z1, x2, y2, z2]: [&[f64; WIDTH]; 6],
+    [x1, y1, z1, x2, y2, z2]: &[[f64; WIDTH]; 6],
     curvature: f64,
 ) -> ([f64; WIDTH], [[f64; WIDTH]; 9]) {
     let mut residual = [0.0; WIDTH];
@@ -184,21 +203,16 @@ fn linearised<const SPHERE: bool>(
     (residual, slope)
 }
 
+/// `D2 E D1`, row by row.
 #[inline]
-fn row_by_row(m: &Matrix3<f64>) -> [f64; 9] {
-    std::array::from_fn(|k| m[(k / 3, k % 3)])
+fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f64; 9] {
+    std::array::from_fn(|k| d2[k / 3] * e[(k / 3, k % 3)] * d1[k % 3])
 }
 
-/// Brings a motion to a local minimum of the summed loss over the subset; the cost there.
-pub(super) fn refine(
-    observations: &Observations,
-    subset: &Subset,
-    motion: &mut Motion,
-    loss: &impl Loss,
-    max_steps: usize,
-) -> f64 {
+/// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, with at most so many steps.
+pub(super) fn refine(subset: &Subset, motion: &mut Motion, loss: &impl Loss, until: f64, max_steps: usize) {
     let mut damping = 1e-4;
-    let mut current = subset.equations(observations, motion, loss);
+    let mut current = subset.equations(motion, loss);
     for _ in 0..max_steps {
         let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else {
             damping *= 10.0;
@@ -208,21 +222,22 @@ pub(super) fn refine(
             continue;
         };
         let trial = motion.stepped(&tangent_basis(&motion.direction), &step.into());
-        let next = subset.equations(observations, &trial, loss);
-        let gain = current.cost - next.cost;
-        let is_short = step.norm_squared() < SHORT * SHORT;
-        if gain > 0.0 {
+        let expected = -current.gradient.dot(&step);
+        let is_last =
+            expected * subset.len as f64 <= until * current.cost || step.norm_squared() < SHORT * SHORT;
+        if is_last {
+            *motion = trial;
+            break;
+        }
+        let next = subset.equations(&trial, loss);
+        if next.cost < current.cost {
             (*motion, current) = (trial, next);
             damping = (0.1 * damping).max(1e-10);
-            if is_short || gain < SMALL_GAIN * current.cost {
-                break;
-            }
         } else {
             damping *= 10.0;
-            if is_short || damping > 1e4 {
+            if damping > 1e4 {
                 break;
             }
         }
     }
-    current.cost
 }

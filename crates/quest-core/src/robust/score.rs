@@ -62,7 +62,7 @@ impl<'a> Scorer<'a> {
             return Self { observations, kernel, columns: Columns::Sphere(columns), reach: reach * angle };
         }
         let mut columns = ImageMatches::new();
-        let [x1, y1, _, x2, y2, _] = observations.columns();
+        let [x1, y1, _, x2, y2, _] = observations.columns.all();
         for i in 0..matches.len() {
             columns.push([x1[i], y1[i]], [x2[i], y2[i]]);
         }

@@ -1,9 +1,10 @@
 //! The search: samples, hypotheses, scores, local optimisation, until enough samples have been drawn.
 //!
-//! A random sample without outliers still has the noise of five matches. So each hypothesis that beats the earlier ones
-//! is refined over its inliers (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM 2003); what it has to beat is
-//! the best hypothesis as it was before its refinement, which leaves more starts for refinement than the refined one
-//! would.
+//! A random sample without outliers still has the noise of five matches. So hypotheses that beat the earlier ones, of each
+//! block of samples the best, are refined over their inliers (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM
+//! 2003); what they have to beat is the best hypothesis as it was before its refinement, which leaves more starts for
+//! refinement than the refined one would. To refine every one that is better than those before it in its block finds
+//! poses no better.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,7 +12,7 @@ use super::loss::Biweight;
 use super::observations::Observations;
 use super::options::KnownDirection;
 use super::pose_score::{PoseScorer, Scored};
-use super::refine::{Subset, refine};
+use super::refine::{COARSE, Subset, refine};
 use super::sampling::{MAX_SAMPLE, Sampler};
 use super::score::{MANY, REACH, Scorer};
 use super::stopping;
@@ -23,6 +24,9 @@ use crate::{Candidates, Correspondence, alignment::best_rotation, solver};
 /// Samples that are solved together before their hypotheses are scored: a few at first, where a few may do.
 const FIRST_BLOCK: usize = 8;
 const BLOCK: usize = 32;
+
+/// A number of samples that is not a multiple of this would leave lanes of the solver unused.
+const LANES: usize = 8;
 
 /// Rounds of local optimisation, each with the inliers of the last.
 const ROUNDS: usize = 3;
@@ -106,9 +110,9 @@ impl<'a> Search<'a> {
         while self.iterations < enough {
             self.samples.clear();
             let mut sample = [0; MAX_SAMPLE];
-            while self.samples.len() < block.min(enough - self.iterations)
-                && sampler.draw(&mut sample).is_some()
-            {
+            let wanted = (enough - self.iterations).next_multiple_of(LANES).min(block);
+            let left = limits.max_iterations - self.iterations;
+            while self.samples.len() < wanted.min(left) && sampler.draw(&mut sample).is_some() {
                 self.samples.push(sample);
             }
             if self.samples.is_empty() {
@@ -118,9 +122,7 @@ impl<'a> Search<'a> {
             let mut hypotheses = std::mem::take(&mut self.hypotheses);
             hypotheses.clear();
             self.solve(&mut hypotheses);
-            for e in &hypotheses {
-                self.consider(e);
-            }
+            self.consider(&hypotheses);
             self.hypotheses = hypotheses;
             enough = self.enough(limits);
             block = BLOCK;
@@ -178,19 +180,27 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Scores a hypothesis, and refines it where it is the best so far.
-    fn consider(&mut self, e: &Matrix3<f64>) {
+    /// Scores hypotheses, and refines the best of them where it is the best so far.
+    fn consider(&mut self, hypotheses: &[Matrix3<f64>]) {
         if self.observations.len() < MANY {
-            return self.consider_one_of_few(e);
-        }
-        if self.scorer.score(e, self.best_hypothesis).is_none() {
+            for e in hypotheses {
+                self.consider_one_of_few(e);
+            }
             return;
         }
-        let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
-        if scored.cost < self.best_hypothesis {
-            self.best_hypothesis = scored.cost;
-            let optimised = self.optimise(scored);
-            self.keep(optimised);
+        let mut best = None;
+        for e in hypotheses {
+            if self.scorer.score(e, self.best_hypothesis).is_none() {
+                continue;
+            }
+            let Some(scored) = self.poses.best_pose(e, self.width()) else { continue };
+            if scored.cost < self.best_hypothesis && self.allows(&scored) {
+                self.best_hypothesis = scored.cost;
+                best = Some(scored.motion);
+            }
+        }
+        if let Some(motion) = best {
+            self.consider_pose(motion);
         }
     }
 
@@ -205,7 +215,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Starts from a pose that is known already.
+    /// Refines a pose, and keeps it where it is better.
     pub(super) fn consider_pose(&mut self, motion: Motion) {
         let scored = self.poses.score(motion, self.width());
         let optimised = self.optimise(scored);
@@ -237,9 +247,9 @@ impl<'a> Search<'a> {
             if count < MAX_SAMPLE.min(self.observations.len()) {
                 break;
             }
-            let subset = Subset::new(self.observations, &self.poses.inliers[..count]);
+            let subset = Subset::new(&self.observations.columns, &self.poses.inliers[..count]);
             let mut motion = best.motion;
-            refine(self.observations, &subset, &mut motion, &loss, STEPS);
+            refine(&subset, &mut motion, &loss, COARSE, STEPS);
             let scored = self.poses.best_pose(&motion.essential(), self.width());
             match scored {
                 Some(scored) if scored.cost < best.cost && self.allows(&scored) => best = scored,

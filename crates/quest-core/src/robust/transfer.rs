@@ -1,51 +1,14 @@
-//! Models that take a point to a point, not to a line: a homography, and the rotation alone.
-//!
-//! The residual is the difference of the transferred point and the point of view 2, in pixels, divided by the noise of
-//! both: `S = I + A Aᵀ` with `A` the derivative of the transfer by the point of view 1 (both with unit noise), whitened by its
-//! Cholesky factor. Two numbers a match, where an essential matrix leaves one.
+//! Refinement of models that take a point to a point, not to a line: a homography, and the rotation alone. Their residuals are
+//! those of [`framed`](super::framed).
 
-use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
-use super::loss::Loss;
-use super::observations::{Frame, FramedMatch};
+use super::framed::{Framed, Lanes, WIDTH, rows, whitened};
+use super::loss::{Loss, Truncated};
+use super::widest::{Work, widest};
 
-/// A residual and its derivatives by `y = H x1`.
-struct Whitened {
-    residual: [f64; 2],
-    slope: [Vector3<f64>; 2],
-    x1: Vector3<f64>,
-    y: Vector3<f64>,
-}
-
-/// `None` where the point is taken behind the camera.
-fn whitened(h: &Matrix3<f64>, m: &FramedMatch) -> Option<Whitened> {
-    let FramedMatch { x1, x2, frame1, frame2 } = *m;
-    let y = h * x1;
-    let Frame { e, n, .. } = frame2;
-    let depth = y.dot(&n);
-    if depth <= 0.0 {
-        return None;
-    }
-    let at = e.map(|e| y.dot(&e) / depth);
-    let mut residual: [f64; 2] = std::array::from_fn(|k| at[k] - x2.dot(&e[k]) / x2.dot(&n));
-    let mut slope: [Vector3<f64>; 2] = std::array::from_fn(|k| (e[k] - n * at[k]) / depth);
-    let moved = frame1.d.map(|d| h * d);
-    let a: [[f64; 2]; 2] = slope.map(|s| moved.map(|m| s.dot(&m)));
-    // The Cholesky factor [k0 0; k1 k2] of S.
-    let k0 = (1.0 + a[0][0] * a[0][0] + a[0][1] * a[0][1]).sqrt();
-    let k1 = (a[0][0] * a[1][0] + a[0][1] * a[1][1]) / k0;
-    let k2 = (1.0 + a[1][0] * a[1][0] + a[1][1] * a[1][1] - k1 * k1).max(f64::MIN_POSITIVE).sqrt();
-    residual[0] /= k0;
-    residual[1] = (residual[1] - k1 * residual[0]) / k2;
-    slope[0] /= k0;
-    slope[1] = (slope[1] - slope[0] * k1) / k2;
-    Some(Whitened { residual, slope, x1, y })
-}
-
-/// The squared whitened residual of a match, infinite where its point is taken behind the camera.
-pub(super) fn square_error(h: &Matrix3<f64>, m: &FramedMatch) -> f64 {
-    whitened(h, m).map_or(f64::INFINITY, |w| w.residual[0] * w.residual[0] + w.residual[1] * w.residual[1])
-}
+/// A descent is at its end when the next step gains no more than this in units of the mean cost of a match.
+const FINE: f64 = 1e-3;
 
 /// The normal equations in `P` parameters.
 struct Equations<const P: usize> {
@@ -54,42 +17,111 @@ struct Equations<const P: usize> {
     gradient: SVector<f64, P>,
 }
 
-fn equations<const P: usize>(
-    matches: &[FramedMatch],
+/// What the parameters of a model are.
+trait Parameters<const P: usize>: Copy {
+    /// The derivatives by the parameters, from those by `y`, from `x1` and from `y`.
+    fn row(self, slope: &[f64; 3], x1: &[f64; 3], y: &[f64; 3]) -> [f64; P];
+}
+
+/// The nine entries of a homography.
+#[derive(Clone, Copy)]
+struct Entries;
+
+impl Parameters<9> for Entries {
+    #[inline(always)]
+    fn row(self, slope: &[f64; 3], x1: &[f64; 3], _: &[f64; 3]) -> [f64; 9] {
+        std::array::from_fn(|k| slope[k / 3] * x1[k % 3])
+    }
+}
+
+/// A small rotation after another.
+#[derive(Clone, Copy)]
+struct Turn;
+
+impl Parameters<3> for Turn {
+    /// `y × slope`.
+    #[inline(always)]
+    fn row(self, slope: &[f64; 3], _: &[f64; 3], y: &[f64; 3]) -> [f64; 3] {
+        [
+            y[1] * slope[2] - y[2] * slope[1],
+            y[2] * slope[0] - y[0] * slope[2],
+            y[0] * slope[1] - y[1] * slope[0],
+        ]
+    }
+}
+
+fn equations<const P: usize, R: Parameters<P>>(
+    matches: &Framed,
     h: &Matrix3<f64>,
     loss: &impl Loss,
-    row: impl Fn(&Vector3<f64>, &Whitened) -> SVector<f64, P>,
+    parameters: R,
 ) -> Equations<P> {
-    let (mut cost, mut hessian, mut gradient) = (0.0, SMatrix::zeros(), SVector::zeros());
-    for m in matches {
-        let Some(w) = whitened(h, m) else {
-            cost += loss.cost_and_weight(f64::MAX.sqrt()).0;
-            continue;
-        };
-        let (c, weight) = loss.cost_and_weight(w.residual[0].powi(2) + w.residual[1].powi(2));
-        cost += c;
-        for k in 0..2 {
-            let jacobian = row(&w.slope[k], &w);
-            gradient += jacobian * (weight * w.residual[k]);
-            let weighted = jacobian * weight;
-            for b in 0..P {
-                for a in 0..=b {
-                    hessian[(a, b)] += weighted[a] * jacobian[b];
+    widest(Accumulation { matches, h: rows(h), loss: *loss, parameters })
+}
+
+/// The sums of the normal equations.
+struct Accumulation<'a, const P: usize, L, R: Parameters<P>> {
+    matches: &'a Framed,
+    h: [f64; 9],
+    loss: L,
+    parameters: R,
+}
+
+impl<const P: usize, L: Loss, R: Parameters<P>> Work for Accumulation<'_, P, L, R> {
+    type Output = Equations<P>;
+
+    #[inline(always)]
+    fn run(self) -> Equations<P> {
+        let Self { matches, h, loss, parameters } = self;
+        let behind = loss.cost_and_weight(f64::MAX.sqrt()).0;
+        let mut cost = [0.0; WIDTH];
+        let mut upper = [[[0.0; WIDTH]; P]; P];
+        let mut gradient = [[0.0; WIDTH]; P];
+        for block in &matches.blocks {
+            let w = whitened(&h, block);
+            let mut weight = [0.0; WIDTH];
+            for j in 0..WIDTH {
+                let [r, s] = [w.residual[0][j], w.residual[1][j]];
+                let (c, live) = loss.cost_and_weight(r * r + s * s);
+                let c = if w.is_in_front[j] { c } else { behind };
+                cost[j] += if block.is_live[j] { c } else { 0.0 };
+                weight[j] = if block.is_live[j] & w.is_in_front[j] { live } else { 0.0 };
+            }
+            for k in 0..2 {
+                let mut jacobian = [[0.0; WIDTH]; P];
+                for j in 0..WIDTH {
+                    let of = |v: &[Lanes; 3]| [v[0][j], v[1][j], v[2][j]];
+                    let row = parameters.row(&of(&w.slope[k]), &of(&block.x1), &of(&w.y));
+                    for a in 0..P {
+                        jacobian[a][j] = row[a];
+                    }
+                }
+                for a in 0..P {
+                    let mut weighted = [0.0; WIDTH];
+                    for j in 0..WIDTH {
+                        weighted[j] = weight[j] * jacobian[a][j];
+                        gradient[a][j] += weighted[j] * w.residual[k][j];
+                    }
+                    for b in a..P {
+                        for j in 0..WIDTH {
+                            upper[a][b][j] += weighted[j] * jacobian[b][j];
+                        }
+                    }
                 }
             }
         }
-    }
-    for b in 0..P {
-        for a in 0..b {
-            hessian[(b, a)] = hessian[(a, b)];
+        Equations {
+            cost: cost.iter().sum(),
+            hessian: SMatrix::from_fn(|a, b| upper[a.min(b)][a.max(b)].iter().sum()),
+            gradient: SVector::from_fn(|a, _| gradient[a].iter().sum()),
         }
     }
-    Equations { cost, hessian, gradient }
 }
 
-/// Levenberg–Marquardt; `row` gives the derivatives by the parameters, `moved` makes a step. The cost that is reached.
+/// Levenberg–Marquardt; `at` gives the equations of a model, `moved` makes a step. The cost before the last step.
 fn minimise<const P: usize, M: Clone>(
     model: &mut M,
+    count: usize,
     max_steps: usize,
     at: impl Fn(&M) -> Equations<P>,
     moved: impl Fn(&M, &SVector<f64, P>) -> M,
@@ -103,15 +135,16 @@ fn minimise<const P: usize, M: Clone>(
             damped[(k, k)] += damping * damped[(k, k)] + free;
         }
         let Some(factor) = nalgebra::Cholesky::new(damped) else { break };
-        let trial = moved(model, &-factor.solve(&current.gradient));
+        let step = -factor.solve(&current.gradient);
+        let trial = moved(model, &step);
+        if -current.gradient.dot(&step) * count as f64 <= FINE * current.cost {
+            *model = trial;
+            break;
+        }
         let next = at(&trial);
-        let gain = current.cost - next.cost;
-        if gain > 0.0 {
+        if next.cost < current.cost {
             (*model, current) = (trial, next);
             damping = (0.1_f64 * damping).max(1e-9);
-            if gain < 1e-5 * current.cost {
-                break;
-            }
         } else {
             damping *= 10.0;
             if damping.is_nan() || damping > 1e5 {
@@ -124,41 +157,39 @@ fn minimise<const P: usize, M: Clone>(
 
 /// Refines a homography of any scale over some of the matches.
 pub(super) fn refine_homography(
-    matches: &[FramedMatch],
+    matches: &Framed,
     h: &mut Matrix3<f64>,
     loss: &impl Loss,
     max_steps: usize,
 ) -> f64 {
-    let row =
-        |slope: &Vector3<f64>, w: &Whitened| SVector::<f64, 9>::from_fn(|k, _| slope[k / 3] * w.x1[k % 3]);
     *h /= h.norm();
     minimise(
         h,
+        matches.len(),
         max_steps,
-        |h| equations(matches, h, loss, row),
+        |h| equations(matches, h, loss, Entries),
         |h, step| (h + Matrix3::from_fn(|i, j| step[3 * i + j])).normalize(),
     )
 }
 
 /// Refines a rotation over some of the matches.
 pub(super) fn refine_rotation(
-    matches: &[FramedMatch],
+    matches: &Framed,
     q_21: &mut UnitQuaternion<f64>,
     loss: &impl Loss,
     max_steps: usize,
 ) -> f64 {
-    let row = |slope: &Vector3<f64>, w: &Whitened| w.y.cross(slope);
     minimise(
         q_21,
+        matches.len(),
         max_steps,
-        |q| equations(matches, &q.to_rotation_matrix().into_inner(), loss, row),
+        |q| equations(matches, &q.to_rotation_matrix().into_inner(), loss, Turn),
         |q, step| UnitQuaternion::new_normalize((UnitQuaternion::new(*step) * q).into_inner()),
     )
 }
 
 /// `Σ Jᵀ J` of a rotation, without weights.
-pub(super) fn rotation_hessian(matches: &[FramedMatch], q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
-    let row = |slope: &Vector3<f64>, w: &Whitened| w.y.cross(slope);
+pub(super) fn rotation_hessian(matches: &Framed, q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    equations(matches, &r_21, &super::loss::Truncated::new(f64::INFINITY), row).hessian
+    equations(matches, &r_21, &Truncated::new(f64::INFINITY), Turn).hessian
 }

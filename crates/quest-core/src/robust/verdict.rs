@@ -4,6 +4,7 @@
 use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
+use super::columns::Columns;
 use super::covariance;
 use super::estimate::{Estimate, Model, RunnerUp};
 use super::length::{Length, length};
@@ -14,11 +15,10 @@ use super::options::EstimateError;
 use super::plane::{self, Plane};
 use super::polish::{FEWEST, Polished, SCALE, polish};
 use super::pose_score::{PoseScorer, Scored};
-use super::refine::{Subset, refine};
+use super::refine::{FINE, Subset, refine};
 use super::score::MANY;
 use super::search::Search;
 use super::significance::{self, is_significant};
-use super::transfer::square_error;
 use super::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
@@ -63,13 +63,12 @@ pub(super) fn conclude(
     let poses = &mut search.poses;
     let mut polished = polish(poses, best.motion);
     let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
-    let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, polished.sigma));
+    let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     replace(poses, &mut polished, &mut others);
     poses.score(polished.scored.motion, poses.threshold);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
-    let false_matches =
-        if observations.len() < MANY { Vec::new() } else { significance::false_matches(observations) };
+    let false_matches = significance::false_matches(observations);
     let agrees = match observations.len() {
         ..MANY => inliers >= MIN_MATCHES,
         _ => is_significant(poses, &polished.scored.motion, iterations, &false_matches),
@@ -104,7 +103,7 @@ struct Found<'a> {
     others: &'a [Alternative],
     of_few: &'a [Scored],
     verdict: Verdict,
-    false_matches: &'a [Observations],
+    false_matches: &'a Columns,
     iterations: usize,
     answer: Answer,
 }
@@ -116,18 +115,19 @@ struct Alternative {
     refined: Scored,
 }
 
-fn alternatives(poses: &mut PoseScorer, plane: &Plane, sigma: f64) -> Vec<Alternative> {
+fn alternatives(poses: &mut PoseScorer, plane: &Plane, polished: &Polished) -> Vec<Alternative> {
     let wide = WIDE * poses.threshold;
-    let loss = GemanMcClure::new(SCALE * sigma);
+    let loss = GemanMcClure::new(SCALE * polished.sigma);
     let mut all = Vec::new();
     for motion in plane.motions.iter().flatten() {
         let Some(of_plane) = poses.best_pose(&motion.essential(), wide) else { continue };
         let mut refined = of_plane;
         let count = poses.inliers.len().min(MATCHES);
-        if count >= FEWEST {
-            let subset = Subset::new(poses.observations, &poses.inliers[..count]);
+        // Beside the pose it would only be found again.
+        if count >= FEWEST && !is_same(&of_plane.motion, &polished.scored.motion) {
+            let subset = Subset::new(&poses.observations.columns, &poses.inliers[..count]);
             let mut motion = of_plane.motion;
-            refine(poses.observations, &subset, &mut motion, &loss, STEPS);
+            refine(&subset, &mut motion, &loss, FINE, STEPS);
             refined = poses.best_pose(&motion.essential(), wide).unwrap_or(refined);
         }
         all.push(Alternative { of_plane, refined });
@@ -176,7 +176,8 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold).powi(2);
-        poses.inliers.retain(|&i| square_error(&r_21, &observations.framed(&[i])[0]) < limit);
+        let mut squares = observations.framed(&poses.inliers).square_errors(&r_21).into_iter();
+        poses.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
     }
     let inliers = poses.inliers.clone();
     let size = length(observations, &motion, &inliers, sigma);
