@@ -157,18 +157,15 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     let sigma = polished.sigma;
     let model = verdict.model;
     let mut motion = polished.scored.motion;
+    let mut second = None;
     match model {
-        // The homography has the motion of a plane better than the essential matrix.
-        Model::Planar if verdict.is_exact_plane => motion = of_plane(others, &motion).unwrap_or(motion),
+        Model::Planar => (motion, second) = both_of_plane(poses, others, &motion, verdict.is_exact_plane),
         Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
-        _ => {}
+        Model::General => {}
     }
-    let mut second = match model {
-        Model::PureRotation => None,
-        _ if observations.len() < MANY => second_of_few(of_few, &motion),
-        Model::Planar => other_of_plane(poses, others, &motion),
-        Model::General => None,
-    };
+    if model != Model::PureRotation && observations.len() < MANY {
+        second = second_of_few(of_few, &motion);
+    }
     if let (Answer::Other, Some(second)) = (answer, &mut second) {
         std::mem::swap(&mut motion, second);
     }
@@ -202,10 +199,28 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     })
 }
 
-/// The motion of the plane that is nearest to a refined motion.
-fn of_plane(others: &[Alternative], motion: &Motion) -> Option<Motion> {
-    let near = others.iter().filter(|a| is_same(&a.refined.motion, motion));
-    near.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost)).map(|a| a.of_plane.motion)
+/// The two motions of a plane, that of the best pose first.
+///
+/// The pose itself is one of the two only as far as the essential matrix determines it: a few false matches, each of
+/// which adds a line to what the plane leaves open, lead it far from both. Where the plane is exact its own motions are the
+/// answers; where it is not, the pose and that motion of the plane from which it is further away.
+fn both_of_plane(
+    poses: &mut PoseScorer,
+    others: &[Alternative],
+    best: &Motion,
+    is_exact: bool,
+) -> (Motion, Option<Motion>) {
+    let far = |a: &Alternative| distance(&a.refined.motion, best);
+    let Some(own) = others.iter().min_by(|a, b| far(a).total_cmp(&far(b))) else { return (*best, None) };
+    let other = others.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+    let first = if is_exact { own.of_plane.motion } else { *best };
+    let second = other.filter(|other| !is_same(&other.of_plane.motion, &own.of_plane.motion));
+    (first, second.and_then(|second| feasible(poses, &first, &second.of_plane.motion)))
+}
+
+/// How far one motion is from another, in radians of rotation and of direction together.
+fn distance(a: &Motion, b: &Motion) -> f64 {
+    a.q_21.angle_to(&b.q_21) + a.direction.angle(&b.direction)
 }
 
 /// The motion of a camera that only turns: the direction of what translation is left.
@@ -222,13 +237,11 @@ fn share(scored: &Scored, observations: &Observations) -> f64 {
     (1.0 - scored.cost / observations.len() as f64).clamp(0.0, 1.0)
 }
 
-/// The other motion of the plane, where it is feasible.
-fn other_of_plane(poses: &mut PoseScorer, others: &[Alternative], best: &Motion) -> Option<Motion> {
+/// The other motion, where nearly as many matches are in front of the cameras.
+fn feasible(poses: &mut PoseScorer, best: &Motion, other: &Motion) -> Option<Motion> {
     poses.score(*best, poses.threshold);
     let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
-    let different = others.iter().filter(|a| !is_same(&a.of_plane.motion, best));
-    let other = different.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost))?;
-    let motion = poses.score(other.of_plane.motion, poses.threshold).motion;
+    let motion = poses.score(*other, poses.threshold).motion;
     (poses.inliers.len() as f64 >= fewest).then_some(motion)
 }
 
