@@ -5,6 +5,7 @@ use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
 use super::covariance;
+use super::doubt::refine_without_chance;
 use super::estimate::{Estimate, Model, RunnerUp};
 use super::length::{Length, length};
 use super::loss::GemanMcClure;
@@ -65,6 +66,7 @@ pub(super) fn conclude(
     let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
     let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, polished.sigma));
     replace(poses, &mut polished, &mut others);
+    refine_without_chance(poses, &mut polished);
     poses.score(polished.scored.motion, poses.threshold);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
@@ -78,6 +80,13 @@ pub(super) fn conclude(
         return Err(no_pose(observations, poses.threshold, inliers));
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
+    let is_plane = verdict.model == Model::Planar && verdict.is_exact_plane;
+    if let Some(plane) = plane.filter(|_| is_plane)
+        && let Some(plane) = plane.over_all(observations, &poses.inliers, polished.sigma)
+    {
+        others = alternatives(poses, &plane, polished.sigma);
+        poses.score(polished.scored.motion, poses.threshold);
+    }
     // A rotation alone is determined by the points of a line, a translation is not.
     let some = &poses.inliers[..inliers.min(DIAGNOSED)];
     let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
