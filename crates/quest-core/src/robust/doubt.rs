@@ -40,34 +40,33 @@ const MOST: usize = 90;
 const USUAL: f64 = 3.0;
 
 /// Among more inliers than this one false match has no weight.
-const ENOUGH: usize = 2_000;
+const ENOUGH: usize = 1_000;
 
-/// Refines a pose without the inliers that agree with it by chance. If there are any, `poses` holds the inliers of the result
-/// afterwards.
+/// Refines a pose, whose inliers `poses` holds, without those that agree with it by chance; `poses` then holds the inliers of the
+/// result.
 pub(super) fn refine_without_chance(poses: &mut PoseScorer, polished: &mut Polished) {
+    let observations = poses.observations;
     let mut motion = polished.scored.motion;
-    poses.score(motion, polished.limit);
     // Of few matches none can be spared.
     if !(MANY..=ENOUGH).contains(&poses.inliers.len()) {
         return;
     }
-    let mut kept = poses.inliers.clone();
-    for _ in 0..ROUNDS {
-        let doubtful = doubtful(poses.observations, &kept, &motion, polished);
-        if doubtful.is_empty() || kept.len() < FEWEST + doubtful.len() {
-            break;
-        }
-        kept.retain(|i| !doubtful.contains(i));
-        let subset = Subset::new(poses.observations, &kept);
-        refine(poses.observations, &subset, &mut motion, &polished.loss, STEPS);
-    }
-    if kept.len() == poses.inliers.len() {
+    let mut chance = doubtful(observations, &poses.inliers, &motion, polished);
+    if chance.is_empty() {
         return;
     }
-    if let Some(scored) = poses.best_pose(&motion.essential(), poses.threshold) {
-        polished.scored = scored;
-        polished.sigma = sigma(poses, &scored.motion);
+    poses.score(motion, polished.limit);
+    let mut kept = poses.inliers.clone();
+    for _ in 0..ROUNDS {
+        if chance.is_empty() || kept.len() < FEWEST + chance.len() {
+            break;
+        }
+        kept.retain(|i| !chance.contains(i));
+        refine(observations, &Subset::new(observations, &kept), &mut motion, &polished.loss, STEPS);
+        chance = doubtful(observations, &kept, &motion, polished);
     }
+    polished.scored = poses.best_pose(&motion.essential(), poses.threshold).unwrap_or(polished.scored);
+    polished.sigma = sigma(poses, &polished.scored.motion);
 }
 
 /// The inliers that are more likely false than true.
@@ -166,6 +165,7 @@ mod tests {
         let mut poses = PoseScorer::new(&observations, 1.5);
         let mut polished = polish(&mut poses, start);
         let before = polished.scored.motion;
+        poses.score(before, 1.5);
         refine_without_chance(&mut poses, &mut polished);
         let after = polished.scored.motion;
         poses.score(after, 1.5);

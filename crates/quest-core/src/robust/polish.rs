@@ -12,7 +12,7 @@ const STEPS: usize = 15;
 /// Inliers, at most, that the first of them looks at: it is where the second begins.
 const ENOUGH: usize = 5_000;
 
-/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth, and less than 1 %
+/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth, and 1 %
 /// where it is recognised.
 const WIDTH: f64 = 2.8;
 const WIDTH_OF_NORMAL: f64 = 5.0;

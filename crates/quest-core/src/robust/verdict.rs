@@ -29,7 +29,7 @@ use crate::{Degeneracy, InputError, RelativePose};
 const SAME: f64 = 0.02;
 const SAME_DIRECTION: f64 = 0.1;
 
-/// The runner-up has at least this share of the inliers of the best.
+/// The runner-up has at least this share of the inliers of the best, and the best of the runner-up's.
 const NEARLY_AS_WELL: f64 = 0.8;
 
 /// A pose replaces another of which it is not a refinement only if its cost is lower by this.
@@ -66,8 +66,8 @@ pub(super) fn conclude(
     let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
     let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, polished.sigma));
     replace(poses, &mut polished, &mut others);
-    refine_without_chance(poses, &mut polished);
     poses.score(polished.scored.motion, poses.threshold);
+    refine_without_chance(poses, &mut polished);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
     let false_matches =
@@ -212,7 +212,8 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
 ///
 /// The pose itself is one of the two only as far as the essential matrix determines it: a few false matches, each of
 /// which adds a line to what the plane leaves open, lead it far from both. Where the plane is exact its own motions are the
-/// answers; where it is not, the pose and that motion of the plane from which it is further away.
+/// answers, if there are more matches than any plane explains; where it is not, the pose and that motion of the plane from
+/// which it is further away. One that leaves many of the points behind a camera is no answer.
 fn both_of_plane(
     poses: &mut PoseScorer,
     others: &[Alternative],
@@ -220,11 +221,28 @@ fn both_of_plane(
     is_exact: bool,
 ) -> (Motion, Option<Motion>) {
     let far = |a: &Alternative| distance(&a.refined.motion, best);
-    let Some(own) = others.iter().min_by(|a, b| far(a).total_cmp(&far(b))) else { return (*best, None) };
-    let other = others.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
-    let first = if is_exact { own.of_plane.motion } else { *best };
-    let second = other.filter(|other| !is_same(&other.of_plane.motion, &own.of_plane.motion));
-    (first, second.and_then(|second| feasible(poses, &first, &second.of_plane.motion)))
+    let (own, other) = match others {
+        [] => return (*best, None),
+        [only] => (only, None),
+        [a, b, ..] if far(a) <= far(b) => (a, Some(b)),
+        [a, b, ..] => (b, Some(a)),
+    };
+    let is_answer = poses.observations.len() >= MANY || is_same(&own.refined.motion, best);
+    let first = if is_exact && is_answer { own.of_plane.motion } else { *best };
+    let other =
+        other.map(|other| other.of_plane.motion).filter(|other| !is_same(other, &own.of_plane.motion));
+    let Some(other) = other else { return (first, None) };
+    let [in_first, in_other] = [first, other].map(|motion| {
+        poses.score(motion, poses.threshold);
+        poses.inliers.len() as f64
+    });
+    if in_other < NEARLY_AS_WELL * in_first {
+        (first, None)
+    } else if in_first < NEARLY_AS_WELL * in_other {
+        (other, None)
+    } else {
+        (first, Some(other))
+    }
 }
 
 /// How far one motion is from another, in radians of rotation and of direction together.
@@ -244,14 +262,6 @@ fn with_length(motion: &Motion, size: Length) -> RelativePose {
 
 fn share(scored: &Scored, observations: &Observations) -> f64 {
     (1.0 - scored.cost / observations.len() as f64).clamp(0.0, 1.0)
-}
-
-/// The other motion, where nearly as many matches are in front of the cameras.
-fn feasible(poses: &mut PoseScorer, best: &Motion, other: &Motion) -> Option<Motion> {
-    poses.score(*best, poses.threshold);
-    let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
-    let motion = poses.score(*other, poses.threshold).motion;
-    (poses.inliers.len() as f64 >= fewest).then_some(motion)
 }
 
 /// The next best of the poses that few matches have.
