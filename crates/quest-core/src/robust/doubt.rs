@@ -140,12 +140,13 @@ mod tests {
     use crate::simulate::{self, FOCAL_LENGTH, Scene, SceneOptions};
     use nalgebra::Vector3;
 
-    /// A camera that hardly moves, and its matches with some more: points at these depths, as a share of the mean depth, seen by
+    /// A camera that hardly moves, and its matches, a third of them false, with some more: points at these depths, as a share of the mean depth, seen by
     /// camera 1 where the first points of the scene are.
     fn scene_with(depths: &[f64], index: u64) -> (Scene, Motion) {
         let motion = simulate::Motion::Parallax(0.01);
         let options = SceneOptions { points: 60, noise_px: 0.5, motion, ..SceneOptions::realistic() };
         let mut scene = Scene::generate(&options, 76, index).unwrap();
+        scene.add_outliers(0.3, 76, index).unwrap();
         let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
         for (k, depth) in depths.iter().enumerate() {
             let a = scene.points1[k];
@@ -174,12 +175,13 @@ mod tests {
     }
 
     #[test]
-    fn one_point_before_the_lens_is_not_believed() {
-        for index in 0..5 {
+    fn one_point_before_the_lens_is_seldom_believed() {
+        let (mut turned, mut cured) = (0, 0);
+        for index in 0..20 {
             let (scene, truth) = scene_with(&[], index);
             let (_, [_, without]) = refined(&scene, truth);
-            let (mut scene, truth) = scene_with(&[0.02], index);
-            // Within the threshold of the truth's epipolar line, but with a lever: the pose turns until it agrees.
+            let (mut scene, truth) = scene_with(&[0.03], index);
+            // Within the threshold of the truth's epipolar line, but with a lever: most poses turn until it agrees.
             let last = scene.matches.last_mut().unwrap();
             let [x1, x2] = [last.bearing1() / last.bearing1().z, last.bearing2() / last.bearing2().z];
             let line = truth.essential() * x1;
@@ -187,8 +189,10 @@ mod tests {
             *last = Correspondence::from_image_points([x1.x, x1.y], x2.into()).unwrap();
             let (_, with) = refined(&scene, truth);
             let [before, after] = with.map(|motion| motion.direction.angle(&without.direction));
-            assert!(before > 2e-3 && after < 1e-4, "{index}: {before} {after}");
+            turned += usize::from(before > 1e-3);
+            cured += usize::from(before > 1e-3 && after < 0.05 * before);
         }
+        assert!(turned >= 10 && 3 * cured >= 2 * turned, "{turned} {cured}");
     }
 
     #[test]
