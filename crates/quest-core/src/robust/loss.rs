@@ -68,6 +68,11 @@ impl HeavyTailed {
         Self { inverse_square: 1.0 / (scale * scale) }
     }
 
+    /// `c²`.
+    pub(super) fn square_scale(self) -> f64 {
+        1.0 / self.inverse_square
+    }
+
     /// By the rule of midpoints, which for functions as smooth as these is exact to four digits.
     pub(super) fn of_normal(self, sigma: f64) -> NormalMeans {
         const REACH: f64 = 6.0;

@@ -19,7 +19,8 @@
 //!    most likely worse than the best (`sampling`, `score`); the best are scored as poses, with the depths of their points
 //!    (`pose_score`), and refined over their inliers (`search`), until enough samples have been drawn (`stopping`).
 //! 3. The best pose is refined over all of its inliers with the noise that they show (`polish`, `refine`, `noise`).
-//! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`plane`).
+//! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`plane`). The best is refined once
+//!    more without the matches that agree with it by chance (`doubt`).
 //! 5. Whether chance explains the inliers (`significance`), and which model they support (`model`).
 //! 6. The length of the translation and the covariance (`length`, `covariance`).
 //!
@@ -34,6 +35,7 @@ mod batch;
 )]
 mod columns;
 mod covariance;
+mod doubt;
 mod estimate;
 #[expect(
     clippy::inline_always,

@@ -106,6 +106,19 @@ impl Observations {
         self.columns.square_angle_of_pixel()
     }
 
+    /// The area of view 2, in square pixels, over which its points are spread: that of a rectangle, evenly filled, with
+    /// their second moments.
+    pub(super) fn area_of_view2(&self) -> f64 {
+        let [_, _, _, x, y, z] = self.columns.all();
+        let points = || x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
+        let count = self.len() as f64;
+        let mean = points().sum::<Vector3<f64>>() / count;
+        let moments = points().map(|x| (x - mean) * (x - mean).transpose()).sum::<Matrix3<f64>>() / count;
+        // w² h² / 144, as the sum of the principal minors: on a sphere no axis is special.
+        let square = 0.5 * (moments.trace().powi(2) - (moments * moments).trace());
+        12.0 * square.max(0.0).sqrt()
+    }
+
     /// A match as vectors on the planes `z = 1`, or as unit bearings.
     pub(super) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
         let m = &self.matches[index];

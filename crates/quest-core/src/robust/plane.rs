@@ -19,8 +19,11 @@ use crate::solver::motion::Motion;
 /// Samples of three points.
 const SAMPLES: usize = 60;
 
-/// Points that a sample is judged by, and that the homography is refined over.
+/// Points that a sample is judged by, and that the homography is first refined over.
 const JUDGES: usize = 120;
+
+/// Points that the homography of a plane is refined over in the end.
+const ENOUGH: usize = 2_000;
 
 /// The 99 % quantile of χ² with two degrees of freedom: what a match counts at most.
 pub(super) const CAP: f64 = 9.21;
@@ -68,9 +71,22 @@ pub(super) fn fit(
     let depths: Vec<_> = judges.iter().map(|&i| inverse_depth(observations, motion, i as usize)).collect();
     let g = most_common_plane(&depths, CAP * sigma * sigma, rng)?;
     let mut homography = motion.q_21.to_rotation_matrix().into_inner() + motion.direction * g.transpose();
+    Some(refined(observations, judges, &mut homography, sigma))
+}
+
+fn refined(observations: &Observations, inliers: &[u32], homography: &mut Matrix3<f64>, sigma: f64) -> Plane {
     let loss = GemanMcClure::new(1.5 * SCALE * sigma);
-    refine_homography(&observations.framed(judges), &mut homography, &loss, STEPS);
-    Some(Plane { homography, motions: homography::motions(&homography) })
+    refine_homography(&observations.framed(inliers), homography, &loss, STEPS);
+    Plane { homography: *homography, motions: homography::motions(homography) }
+}
+
+impl Plane {
+    /// Refined over more of the inliers, if there are more; `None` if not.
+    pub(super) fn over_all(&self, observations: &Observations, inliers: &[u32], sigma: f64) -> Option<Self> {
+        let inliers = &inliers[..inliers.len().min(ENOUGH)];
+        let mut homography = self.homography;
+        (inliers.len() > JUDGES).then(|| refined(observations, inliers, &mut homography, sigma))
+    }
 }
 
 /// The `g` with `ρ = g · x1` for most of the points.

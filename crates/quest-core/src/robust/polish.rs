@@ -12,8 +12,10 @@ const STEPS: usize = 15;
 /// Inliers, at most, that the first of them looks at: it is where the second begins.
 const ENOUGH: usize = 5_000;
 
-/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth.
+/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth, and 1 %
+/// where it is recognised.
 const WIDTH: f64 = 2.8;
+const WIDTH_OF_NORMAL: f64 = 5.0;
 
 /// The inliers that it is fitted over, in standard deviations.
 const WIDE: f64 = 9.0;
@@ -49,8 +51,11 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     }
     let shown = sigma(poses, &best.motion);
     let noise = noise::prudent(shown, poses.inliers.len(), threshold);
-    let (loss, limit) = (HeavyTailed::new(WIDTH * noise), WIDE * noise);
+    let limit = WIDE * noise;
     poses.score(best.motion, limit);
+    let residuals = poses.inliers.iter().map(|&i| poses.residuals()[i as usize]);
+    let width = if noise::is_normal(residuals, shown) { WIDTH_OF_NORMAL } else { WIDTH };
+    let loss = HeavyTailed::new(width * noise);
     if poses.inliers.len() >= FEWEST {
         let mut motion = best.motion;
         let subset = Subset::new(&poses.observations.columns, &poses.inliers);
@@ -71,7 +76,7 @@ fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
 }
 
 /// The noise of the inliers of a pose; leaves its inliers in `poses`.
-fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
+pub(super) fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
     poses.score(*motion, poses.threshold);
     noise::estimate(poses.inliers.iter().map(|&i| poses.residuals()[i as usize]), poses.threshold)
 }

@@ -65,18 +65,20 @@ fn exact_matches_give_the_exact_pose() {
 #[test]
 fn planes_are_recognised_and_have_two_poses() {
     let planar = SceneOptions { layout: Layout::Coplanar, ..noisy(100) };
-    let (mut two, mut near) = (0, 0);
-    for index in 20..30 {
+    let (mut recognised, mut two, mut near) = (0, 0, 0);
+    for index in 1_000..1_100 {
         let (scene, _) = scene(&planar, 0.3, index);
         let found = estimate(&scene.matches, &options()).unwrap();
-        assert_eq!(found.model, Model::Planar, "scene {index}: {:?}", found.evidence);
+        recognised += usize::from(found.model == Model::Planar);
         two += usize::from(found.runner_up.is_some());
         let poses = [Some(found.pose), found.runner_up.map(|r| r.pose)];
         let error = |p: &RelativePose| errors(p, &scene.truth).into_iter().fold(0.0, f64::max);
         near += usize::from(poses.iter().flatten().map(error).fold(180.0, f64::min) < 10.0);
     }
-    assert!(two >= 5, "{two}");
-    assert!(near >= 9, "{near}");
+    // Seen nearly from the side a plane is a line, which says little; two thousand scenes are in the benches.
+    assert!(recognised >= 98, "{recognised}");
+    assert!(two >= 88, "{two}");
+    assert!(near >= 97, "{near}");
 }
 
 #[test]

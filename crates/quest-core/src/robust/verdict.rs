@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::columns::Columns;
 use super::covariance;
+use super::doubt::refine_without_chance;
 use super::estimate::{Estimate, Model, RunnerUp};
 use super::length::{Length, length};
 use super::loss::GemanMcClure;
@@ -28,7 +29,7 @@ use crate::{Degeneracy, InputError, RelativePose};
 const SAME: f64 = 0.02;
 const SAME_DIRECTION: f64 = 0.1;
 
-/// The runner-up has at least this share of the inliers of the best.
+/// The runner-up has at least this share of the inliers of the best, and the best of the runner-up's.
 const NEARLY_AS_WELL: f64 = 0.8;
 
 /// A pose replaces another of which it is not a refinement only if its cost is lower by this.
@@ -66,6 +67,7 @@ pub(super) fn conclude(
     let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     replace(poses, &mut polished, &mut others);
     poses.score(polished.scored.motion, poses.threshold);
+    refine_without_chance(poses, &mut polished);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
     let false_matches = significance::false_matches(observations);
@@ -77,6 +79,13 @@ pub(super) fn conclude(
         return Err(no_pose(observations, poses.threshold, inliers));
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
+    let is_plane = verdict.model == Model::Planar && verdict.is_exact_plane;
+    if let Some(plane) = plane.filter(|_| is_plane)
+        && let Some(plane) = plane.over_all(observations, &poses.inliers, polished.sigma)
+    {
+        others = alternatives(poses, &plane, &polished);
+        poses.score(polished.scored.motion, poses.threshold);
+    }
     // A rotation alone is determined by the points of a line, a translation is not.
     let some = &poses.inliers[..inliers.min(DIAGNOSED)];
     let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
@@ -157,18 +166,15 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     let sigma = polished.sigma;
     let model = verdict.model;
     let mut motion = polished.scored.motion;
+    let mut second = None;
     match model {
-        // The homography has the motion of a plane better than the essential matrix.
-        Model::Planar if verdict.is_exact_plane => motion = of_plane(others, &motion).unwrap_or(motion),
+        Model::Planar => (motion, second) = both_of_plane(poses, others, &motion, verdict.is_exact_plane),
         Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
-        _ => {}
+        Model::General => {}
     }
-    let mut second = match model {
-        Model::PureRotation => None,
-        _ if observations.len() < MANY => second_of_few(of_few, &motion),
-        Model::Planar => other_of_plane(poses, others, &motion),
-        Model::General => None,
-    };
+    if model != Model::PureRotation && observations.len() < MANY {
+        second = second_of_few(of_few, &motion);
+    }
     if let (Answer::Other, Some(second)) = (answer, &mut second) {
         std::mem::swap(&mut motion, second);
     }
@@ -203,10 +209,46 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     })
 }
 
-/// The motion of the plane that is nearest to a refined motion.
-fn of_plane(others: &[Alternative], motion: &Motion) -> Option<Motion> {
-    let near = others.iter().filter(|a| is_same(&a.refined.motion, motion));
-    near.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost)).map(|a| a.of_plane.motion)
+/// The two motions of a plane, that of the best pose first.
+///
+/// The pose itself is one of the two only as far as the essential matrix determines it: a few false matches, each of
+/// which adds a line to what the plane leaves open, lead it far from both. Where the plane is exact its own motions are the
+/// answers, if there are more matches than any plane explains; where it is not, the pose and that motion of the plane from
+/// which it is further away. One that leaves many of the points behind a camera is no answer.
+fn both_of_plane(
+    poses: &mut PoseScorer,
+    others: &[Alternative],
+    best: &Motion,
+    is_exact: bool,
+) -> (Motion, Option<Motion>) {
+    let far = |a: &Alternative| distance(&a.refined.motion, best);
+    let (own, other) = match others {
+        [] => return (*best, None),
+        [only] => (only, None),
+        [a, b, ..] if far(a) <= far(b) => (a, Some(b)),
+        [a, b, ..] => (b, Some(a)),
+    };
+    let is_answer = poses.observations.len() >= MANY || is_same(&own.refined.motion, best);
+    let first = if is_exact && is_answer { own.of_plane.motion } else { *best };
+    let other =
+        other.map(|other| other.of_plane.motion).filter(|other| !is_same(other, &own.of_plane.motion));
+    let Some(other) = other else { return (first, None) };
+    let [in_first, in_other] = [first, other].map(|motion| {
+        poses.score(motion, poses.threshold);
+        poses.inliers.len() as f64
+    });
+    if in_other < NEARLY_AS_WELL * in_first {
+        (first, None)
+    } else if in_first < NEARLY_AS_WELL * in_other {
+        (other, None)
+    } else {
+        (first, Some(other))
+    }
+}
+
+/// How far one motion is from another, in radians of rotation and of direction together.
+fn distance(a: &Motion, b: &Motion) -> f64 {
+    a.q_21.angle_to(&b.q_21) + a.direction.angle(&b.direction)
 }
 
 /// The motion of a camera that only turns: the direction of what translation is left.
@@ -221,16 +263,6 @@ fn with_length(motion: &Motion, size: Length) -> RelativePose {
 
 fn share(scored: &Scored, observations: &Observations) -> f64 {
     (1.0 - scored.cost / observations.len() as f64).clamp(0.0, 1.0)
-}
-
-/// The other motion of the plane, where it is feasible.
-fn other_of_plane(poses: &mut PoseScorer, others: &[Alternative], best: &Motion) -> Option<Motion> {
-    poses.score(*best, poses.threshold);
-    let fewest = NEARLY_AS_WELL * poses.inliers.len() as f64;
-    let different = others.iter().filter(|a| !is_same(&a.of_plane.motion, best));
-    let other = different.min_by(|a, b| a.of_plane.cost.total_cmp(&b.of_plane.cost))?;
-    let motion = poses.score(other.of_plane.motion, poses.threshold).motion;
-    (poses.inliers.len() as f64 >= fewest).then_some(motion)
 }
 
 /// The next best of the poses that few matches have.
