@@ -23,6 +23,7 @@ pub mod quest_eigen;
 mod refining;
 pub mod relinearization;
 pub(crate) mod shortlist;
+mod split;
 pub mod stewenius;
 mod trace_cubics;
 mod twenty;
