@@ -22,38 +22,36 @@ pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep
         if size == 0.0 || size.is_nan() {
             return 0.0;
         }
-        // Whole rows: what stands left of column k is not read again, and loops of fixed length vectorise.
+        // Whole rows: what stands left of column k is zero by now, and loops of fixed length vectorise.
         let inverse = 1.0 / a[pivot][k];
         let row = a[pivot].map(|x| x * inverse);
-        for i in k + 1..R {
-            // Row k takes the place of the pivot's.
-            let from = if i == pivot { k } else { i };
-            a[i] = difference(&a[from], a[from][k], &row);
+        a[pivot] = a[k];
+        for other in &mut a[k + 1..] {
+            let factor = other[k];
+            subtract(other, factor, &row);
         }
         a[k] = row;
     }
     for k in (keep + 1..R).rev() {
-        let row = a[k];
-        for other in &mut a[keep..k] {
-            *other = difference(other, other[k], &row);
+        let (others, rows) = a.split_at_mut(k);
+        for other in &mut others[keep..] {
+            let factor = other[k];
+            subtract(&mut other[R..], factor, &rows[0][R..]);
         }
     }
     smallest / largest
 }
 
-/// `row − factor · other`.
+/// `x − factor · y` in place of `x`.
 #[inline]
-fn difference<const C: usize>(row: &[f64; C], factor: f64, other: &[f64; C]) -> [f64; C] {
-    let mut out = [0.0; C];
-    let (blocks, rest) = out.as_chunks_mut::<2>();
-    let ((x, x_rest), (y, y_rest)) = (row.as_chunks::<2>(), other.as_chunks::<2>());
-    for ((out, x), y) in blocks.iter_mut().zip(x).zip(y) {
-        *out = (Two::new(*x) - Two::new(*y) * factor).to_array();
+fn subtract(x: &mut [f64], factor: f64, y: &[f64]) {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks_mut::<2>(), y.as_chunks::<2>());
+    for (x, y) in x.iter_mut().zip(y) {
+        *x = (Two::new(*x) - Two::new(*y) * factor).to_array();
     }
-    for ((out, x), y) in rest.iter_mut().zip(x_rest).zip(y_rest) {
-        *out = x - factor * y;
+    for (x, y) in x_rest.iter_mut().zip(y_rest) {
+        *x -= factor * y;
     }
-    out
 }
 
 /// Eliminates the first `columns` columns by row operations with partial pivoting: below the first `columns` rows they

@@ -22,6 +22,7 @@ pub mod quest;
 pub mod quest_eigen;
 mod refining;
 pub mod relinearization;
+mod resultant;
 pub(crate) mod shortlist;
 mod split;
 pub mod stewenius;
