@@ -10,7 +10,7 @@
 //! 3. Ten cubics without the factor `p`, a polynomial of degree ten, its real roots by Sturm's theorem
 //!    (`cubics.rs`, `resultant.rs`).
 //! 4. Each root gives an essential matrix, two rotations and a translation; Newton's iteration on the five
-//!    parameters of the motion brings the constraints to zero.
+//!    parameters of the motion brings the constraints to zero, which it knows to twice the digits (`split.rs`).
 //! 5. A complex pair of roots gives two complex quaternions: their real parts. Under noise the true pose often hides there.
 //! 6. Translation and depths with one scale: [`structure`](crate::structure).
 //!
@@ -119,7 +119,7 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
     if alignment.is_pure_rotation() {
         return None;
     }
-    let mut shortlist = Shortlist::new();
+    let mut shortlist = Shortlist::of_five(&alignment);
     from_five(Kinds::Exact, &alignment, matches, &mut shortlist).ok().map(|()| shortlist)
 }
 
