@@ -26,7 +26,7 @@ pub struct Scene {
     pub truth: RelativePose,
     /// The points in the frame of camera 1.
     pub points1: Vec<Vector3<f64>>,
-    /// Their images on the planes `z = 1`, by (27), with noise if there is any.
+    /// Their images on the planes `z = 1`, by (27), with noise if there is any; without, rounded once.
     pub matches: Vec<Correspondence>,
 }
 
