@@ -22,13 +22,15 @@ pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep
         if size == 0.0 || size.is_nan() {
             return 0.0;
         }
-        // Whole rows: what stands left of column k is zero by now, and loops of fixed length vectorise.
+        // Whole rows: what stands left of column k is not read again, and loops of fixed length vectorise.
         let inverse = 1.0 / a[pivot][k];
         let row = a[pivot].map(|x| x * inverse);
-        a[pivot] = a[k];
-        for other in &mut a[k + 1..] {
-            let factor = other[k];
-            subtract(other, factor, &row);
+        for i in k + 1..R {
+            // Row k takes the place of the pivot's.
+            let from = if i == pivot { k } else { i };
+            let (mut next, factor) = (a[from], a[from][k]);
+            subtract(&mut next, factor, &row);
+            a[i] = next;
         }
         a[k] = row;
     }
