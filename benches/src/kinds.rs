@@ -22,6 +22,13 @@ impl SceneKind {
         Self { name: name.into(), options, partner_at_zero: false }
     }
 
+    /// The same with this many points in a scene.
+    #[must_use]
+    pub fn with_points(mut self, points: usize) -> Self {
+        self.options.points = points;
+        self
+    }
+
     /// The scene of this kind, seed and index.
     ///
     /// Every essential matrix has two rotations, `q` and its twisted partner `t ⊗ q`, whose first component is

@@ -25,6 +25,9 @@ struct Arguments {
     /// Scenes of a row
     #[arg(long, default_value_t = 100_000)]
     scenes: u64,
+    /// Matches of a scene without noise, in the table of failures
+    #[arg(long, default_value_t = 5)]
+    points: usize,
     /// Seed of the scenes
     #[arg(long, default_value_t = SEED)]
     seed: u64,
@@ -58,7 +61,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     if arguments.solvers.is_empty() {
         arguments.solvers = SolverName::ALL.to_vec();
     }
-    arguments.solvers.retain(|solver| solver.info().min_matches <= 5);
     println!("{} scenes a row, seed {}", arguments.scenes, arguments.seed);
     for name in &arguments.tables {
         match name {
@@ -78,6 +80,11 @@ impl Arguments {
         f: impl Fn(&Scene) -> T + Sync,
     ) -> Result<Vec<T>, SceneError> {
         parallel::map(self.scenes, self.threads, |index| Ok(f(&kind.scene(self.seed, index)?)))
+    }
+
+    /// The solvers to which five matches are enough.
+    fn five_point_solvers(&self) -> impl Iterator<Item = SolverName> {
+        self.solvers.iter().copied().filter(|solver| solver.info().min_matches <= 5)
     }
 
     fn is_wanted(&self, kind: &SceneKind) -> bool {
@@ -106,11 +113,12 @@ fn judge(cell: Cell, scene: &Scene) -> Judged {
 fn failures(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let mut table =
         table(["scenes", "solver", "kinds", "R fails", "pose fails", "median R", "99.9 % R", "candidates"]);
-    let cells = Cell::of(&arguments.solvers, 5);
+    let cells = Cell::of(&arguments.solvers, arguments.points);
     let mut failing = Vec::new();
-    for kind in kinds::noise_free().iter().filter(|kind| arguments.is_wanted(kind)) {
+    let kinds = kinds::noise_free().into_iter().map(|kind| kind.with_points(arguments.points));
+    for kind in kinds.filter(|kind| arguments.is_wanted(kind)) {
         let judge_all = |scene: &Scene| cells.iter().map(|&cell| judge(cell, scene)).collect::<Vec<_>>();
-        let judged = arguments.scenes(kind, judge_all)?;
+        let judged = arguments.scenes(&kind, judge_all)?;
         for (k, cell) in cells.iter().enumerate() {
             let rotation = sorted(judged.iter().map(|j| j[k].rotation));
             let indices = |error: fn(&Judged) -> f64| {
@@ -138,6 +146,7 @@ fn failures(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     println!("\n### Without noise\n");
+    println!("{} matches a scene.", arguments.points);
     println!("R fails: no candidate within {:.0e} rad of the true rotation.", errors::TOLERANCE);
     println!(
         "Pose fails: none with max(error of R, |t| × error of t's direction) below 1e-6 × max(|t|, 1e-6).\n"
@@ -195,7 +204,7 @@ fn noise(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         "no exact",
     ]);
     for kind in kinds::noisy(5 + FURTHER_POINTS).iter().filter(|kind| arguments.is_wanted(kind)) {
-        for &solver in &arguments.solvers {
+        for solver in arguments.five_point_solvers() {
             let judged = arguments.scenes(kind, |scene| judge_noisy(solver, scene))?;
             let answered: Vec<_> = judged.iter().filter(|n| n.candidates[0] > 0).collect();
             let best = [0, 1].map(|k| mean(answered.iter().map(|n| n.best[k])));
@@ -224,7 +233,7 @@ fn noise(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn length(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let mut table = table(["parallax", "solver", "median |ratio − 1|", "99.9 %", "largest", "no pose"]);
     for (parallax, kind) in kinds::parallaxes().iter().filter(|(_, kind)| arguments.is_wanted(kind)) {
-        for &solver in &arguments.solvers {
+        for solver in arguments.five_point_solvers() {
             let off = arguments.scenes(kind, |scene| {
                 let mut out = Candidates::new();
                 solver.solve(quest_core::solver::Kinds::All, &scene.matches, &mut out);

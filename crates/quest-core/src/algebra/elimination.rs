@@ -28,32 +28,32 @@ pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep
         for i in k + 1..R {
             // Row k takes the place of the pivot's.
             let from = if i == pivot { k } else { i };
-            a[i] = difference(&a[from], a[from][k], &row);
+            let (mut next, factor) = (a[from], a[from][k]);
+            subtract(&mut next, factor, &row);
+            a[i] = next;
         }
         a[k] = row;
     }
     for k in (keep + 1..R).rev() {
-        let row = a[k];
-        for other in &mut a[keep..k] {
-            *other = difference(other, other[k], &row);
+        let (others, rows) = a.split_at_mut(k);
+        for other in &mut others[keep..] {
+            let factor = other[k];
+            subtract(&mut other[R..], factor, &rows[0][R..]);
         }
     }
     smallest / largest
 }
 
-/// `row − factor · other`.
+/// `x − factor · y` in place of `x`.
 #[inline]
-fn difference<const C: usize>(row: &[f64; C], factor: f64, other: &[f64; C]) -> [f64; C] {
-    let mut out = [0.0; C];
-    let (blocks, rest) = out.as_chunks_mut::<2>();
-    let ((x, x_rest), (y, y_rest)) = (row.as_chunks::<2>(), other.as_chunks::<2>());
-    for ((out, x), y) in blocks.iter_mut().zip(x).zip(y) {
-        *out = (Two::new(*x) - Two::new(*y) * factor).to_array();
+fn subtract(x: &mut [f64], factor: f64, y: &[f64]) {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks_mut::<2>(), y.as_chunks::<2>());
+    for (x, y) in x.iter_mut().zip(y) {
+        *x = (Two::new(*x) - Two::new(*y) * factor).to_array();
     }
-    for ((out, x), y) in rest.iter_mut().zip(x_rest).zip(y_rest) {
-        *out = x - factor * y;
+    for (x, y) in x_rest.iter_mut().zip(y_rest) {
+        *x -= factor * y;
     }
-    out
 }
 
 /// Eliminates the first `columns` columns by row operations with partial pivoting: below the first `columns` rows they

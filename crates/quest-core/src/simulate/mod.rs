@@ -13,6 +13,7 @@
 
 mod camera;
 mod experiment;
+mod long;
 mod metrics;
 mod options;
 mod outliers;

@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
 
+use super::long::image2;
 use super::sampling::{self, Region};
 use super::{Motion, SceneError, SceneOptions, View, is_inside_image, pixel_to_plane, plane_to_pixel};
 use crate::{Correspondence, InputError, RelativePose, correspondence};
@@ -25,7 +26,7 @@ pub struct Scene {
     pub truth: RelativePose,
     /// The points in the frame of camera 1.
     pub points1: Vec<Vector3<f64>>,
-    /// Their images on the planes `z = 1`, by (27), with noise if there is any.
+    /// Their images on the planes `z = 1`, by (27), with noise if there is any; without, rounded once.
     pub matches: Vec<Correspondence>,
 }
 
@@ -89,7 +90,7 @@ impl Scene {
             return Err(SceneError::NoPoints);
         }
         let images1: Vec<_> = points1.iter().map(|x1| image(*x1)).collect();
-        let images2: Vec<_> = points1.iter().map(|x1| image(pose.q_21 * x1 + pose.t_21)).collect();
+        let images2: Vec<_> = points1.iter().map(|x1| image2(&pose.q_21, &pose.t_21, x1)).collect();
         let matches = correspondence::from_image_points(&images1, &images2)?;
         let scale = 1.0 / mean_depth(&pose.q_21, &pose.t_21, &points1);
         let truth = RelativePose::new(pose.q_21, pose.t_21 * scale);

@@ -1,4 +1,4 @@
-//! The five-point problem as a polynomial of degree ten that survives a vanishing parallax.
+//! The five-point problem as ten cubics that survive a vanishing parallax.
 //!
 //! Five rows of [`Alignment`](super::aligned::Alignment) leave `(t, S) = x N1 + y N2 + z N3 + w N4`. With `K = [t]×`,
 //! `E = K + p S` and `−K² = |t|² I − t tᵀ`,
@@ -15,15 +15,21 @@
 //! det(tr(S) I − 2 S) = 0                                          the tenth
 //! ```
 //!
-//! The tenth stands in place of `det E = p tᵀ S t + p³ det S`, since `tr C + 2 det(E) / p = −p² det(tr(S) I − 2 S)`. As
-//! `p → 0` the ten become the equations of the differential five-point problem, and nothing degenerates.
+//! The tenth stands in place of `det E = 0`. The adjugate of `K` is `t tᵀ`, and the trace of a symmetric times an antisymmetric
+//! matrix vanishes:
 //!
-//! From here as D. Nistér, *An efficient solution to the five-point relative pose problem*, PAMI 26 (2004), section 3.2: the
-//! ten cubics in `x, y, z` with `w = 1` are reduced to the six leading monomials that matter; three combinations of
-//! these are linear in `x` and `y`, with coefficients that are polynomials in `z`; their determinant has degree ten.
+//! ```text
+//! det E = p tᵀ S t + p³ det S
+//! tr C  = −2 tᵀ S t + p² (2 tr S³ − tr S tr S²)
+//! det(tr(S) I − 2 S) = tr S tr S² − 2 tr S³ − 2 det S             by the eigenvalues of S
+//! tr C + 2 det(E) / p = −p² det(tr(S) I − 2 S)
+//! ```
+//!
+//! As `p → 0` the ten become the equations of the differential five-point problem, and nothing degenerates.
+//!
+//! `resultant.rs` reduces them to a polynomial in `z`.
 
 use super::aligned::Coordinates;
-use crate::algebra::elimination;
 use crate::algebra::monomials::{homogeneous, position, sum};
 use crate::algebra::number::Number;
 use crate::algebra::two::Two;
@@ -55,9 +61,6 @@ pub(crate) const CUBIC: [[u8; 4]; 20] = [
     [0, 0, 1, 2],
     [0, 0, 0, 3],
 ];
-
-/// The first of the eliminated rows that is used: `x²z, x²w, y²z, y²w, xyz, xyw`.
-const FIRST_USED: usize = 4;
 
 const VARIABLES: [[u8; 4]; 4] = homogeneous::<4>(1);
 
@@ -96,6 +99,16 @@ pub(crate) fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
     }
 }
 
+/// The sum of products of linear forms.
+#[inline]
+fn sum_of_products<const N: usize>(terms: [(&Linear, &Linear); N]) -> Quadratic {
+    let mut out = [0.0; 10];
+    for (a, b) in terms {
+        add_linear_product(&mut out, a, b);
+    }
+    out
+}
+
 #[inline]
 fn square(a: &Linear) -> Quadratic {
     let mut out = [0.0; 10];
@@ -106,11 +119,6 @@ fn square(a: &Linear) -> Quadratic {
         }
     }
     out
-}
-
-#[inline]
-fn sum_of(a: &Quadratic, b: &Quadratic, c: &Quadratic) -> Quadratic {
-    std::array::from_fn(|q| a[q] + b[q] + c[q])
 }
 
 #[inline]
@@ -128,11 +136,10 @@ pub(crate) fn scaled(a: &Linear, factor: f64) -> Linear {
     a.map(|x| factor * x)
 }
 
-/// The entries of `t`, `S`, `K` and `E` as linear forms in `(x, y, z, w)`.
+/// The entries of `t`, `S` and `E` as linear forms in `(x, y, z, w)`.
 struct Forms {
     t: [Linear; 3],
     s: [[Linear; 3]; 3],
-    k: [[Linear; 3]; 3],
     e: [[Linear; 3]; 3],
 }
 
@@ -141,51 +148,51 @@ impl Forms {
     fn new(basis: &[Coordinates; 4], p: f64) -> Self {
         let form = |row: usize| -> Linear { std::array::from_fn(|m| basis[m][row]) };
         let [t0, t1, t2, xx, yy, zz, xy, xz, yz]: [Linear; 9] = std::array::from_fn(form);
-        let negative = |a: &Linear| scaled(a, -1.0);
-        let zero = [0.0; 4];
-        let k = [[zero, negative(&t2), t1], [t2, zero, negative(&t0)], [negative(&t1), t0, zero]];
-        let s = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-        let e = std::array::from_fn(|i| {
-            std::array::from_fn(|j| std::array::from_fn(|m| k[i][j][m] + p * s[i][j][m]))
-        });
-        Self { t: [t0, t1, t2], s, k, e }
+        // p S + K.
+        let plus = |s: &Linear, k: &Linear| -> Linear { std::array::from_fn(|m| p * s[m] + k[m]) };
+        let minus = |s: &Linear, k: &Linear| -> Linear { std::array::from_fn(|m| p * s[m] - k[m]) };
+        let e = [
+            [scaled(&xx, p), minus(&xy, &t2), plus(&xz, &t1)],
+            [plus(&xy, &t2), scaled(&yy, p), minus(&yz, &t0)],
+            [minus(&xz, &t1), plus(&yz, &t0), scaled(&zz, p)],
+        ];
+        Self { t: [t0, t1, t2], s: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], e }
     }
 
-    /// `Λ`, by its upper triangle.
+    /// `S_xx, S_yy, S_zz, S_xy, S_xz, S_yz`.
+    #[inline]
+    fn upper_s(&self) -> [&Linear; 6] {
+        let [[xx, xy, xz], [_, yy, yz], [.., zz]] = &self.s;
+        [xx, yy, zz, xy, xz, yz]
+    }
+
+    /// `Λ`, by its upper triangle. With `E = K + p S`
+    ///
+    /// ```text
+    /// Λ_xx = 4 (t_y S_xz − t_z S_xy) + p (S_xx² − S_yy² − S_zz² − 2 S_yz²)
+    /// Λ_xy = 2 (S_xx E_yx + S_yy E_xy + S_yz E_xz − t_x S_xz)
+    /// ```
+    ///
+    /// and so in turn.
     #[inline]
     fn lambda(&self, p: f64) -> [[Quadratic; 3]; 3] {
-        let mut lambda = [[[0.0; 10]; 3]; 3];
-        let twice = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, 2.0)));
-        let [[xx, xy, xz], [_, yy, yz], [.., zz]] = self.s.each_ref().map(|row| row.each_ref().map(square));
-        let diagonal: [Quadratic; 3] =
-            [[&xx, &xy, &xz], [&xy, &yy, &yz], [&xz, &yz, &zz]].map(|[a, b, c]| sum_of(a, b, c));
-        let trace = sum_of(&diagonal[0], &diagonal[1], &diagonal[2]);
-        for i in 0..3 {
-            // K S − S K = K S + (K S)ᵀ, and the diagonal of K is zero.
-            let entry = &mut lambda[i][i];
-            for m in (0..3).filter(|&m| m != i) {
-                add_linear_product(entry, &self.k[i][m], &twice[m][i]);
-            }
-            for q in 0..10 {
-                entry[q] = 2.0 * entry[q] + p * (2.0 * diagonal[i][q] - trace[q]);
-            }
-            for j in i + 1..3 {
-                let (entry, mut square) = (&mut lambda[i][j], [0.0; 10]);
-                for m in 0..3 {
-                    if m != i {
-                        add_linear_product(entry, &self.k[i][m], &twice[m][j]);
-                    }
-                    if m != j {
-                        add_linear_product(entry, &self.k[j][m], &twice[m][i]);
-                    }
-                    add_linear_product(&mut square, &twice[i][m], &self.s[m][j]);
-                }
-                for q in 0..10 {
-                    entry[q] += p * square[q];
-                }
-            }
-        }
-        lambda
+        let [xx, yy, zz, xy, xz, yz] = &self.upper_s().map(|a| scaled(a, 2.0));
+        let [sxx, syy, szz, sxy, sxz, syz] = &self.upper_s().map(square);
+        let (e, [t0, t1, t2]) = (&self.e, &self.t.each_ref().map(|t| scaled(t, 2.0)));
+        let [m0, m1, m2] = &self.t.each_ref().map(|t| scaled(t, -1.0));
+        let turned = [(t0, yz), (t1, xz), (t2, xy)].map(|pair| sum_of_products([pair]));
+        let on = |i: usize, [a, b, c, d]: [&Quadratic; 4]| -> Quadratic {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            std::array::from_fn(|q| turned[j][q] - turned[k][q] + p * (a[q] - b[q] - c[q] - 2.0 * d[q]))
+        };
+        let off_xy = sum_of_products([(xx, &e[1][0]), (yy, &e[0][1]), (yz, &e[0][2]), (xz, m0)]);
+        let off_xz = sum_of_products([(zz, &e[0][2]), (xx, &e[2][0]), (xy, &e[2][1]), (yz, m2)]);
+        let off_yz = sum_of_products([(yy, &e[2][1]), (zz, &e[1][2]), (xz, &e[1][0]), (xy, m1)]);
+        [
+            [on(0, [sxx, syy, szz, syz]), off_xy, off_xz],
+            [off_xy, on(1, [syy, szz, sxx, sxz]), off_yz],
+            [off_xz, off_yz, on(2, [szz, sxx, syy, sxy])],
+        ]
     }
 
     /// `det(tr(S) I − 2 S)`.
@@ -200,9 +207,7 @@ impl Forms {
         let mut out = [0.0; 20];
         for j in 0..3 {
             let (a, b) = ((j + 1) % 3, (j + 2) % 3);
-            let mut minor = [0.0; 10];
-            add_linear_product(&mut minor, &d[1][a], &d[2][b]);
-            add_linear_product(&mut minor, &scaled(&d[1][b], -1.0), &d[2][a]);
+            let minor = sum_of_products([(&d[1][a], &d[2][b]), (&scaled(&d[1][b], -1.0), &d[2][a])]);
             add_product(&mut out, &minor, &d[0][j]);
         }
         out
@@ -215,13 +220,8 @@ pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let Forms { t, s, e, .. } = &forms;
     let lambda = forms.lambda(p);
     // −2 tᵀ S.
-    let row: [Quadratic; 3] = std::array::from_fn(|j| {
-        let mut entry = [0.0; 10];
-        for m in 0..3 {
-            add_linear_product(&mut entry, &scaled(&t[m], -2.0), &s[m][j]);
-        }
-        entry
-    });
+    let [m0, m1, m2] = &t.each_ref().map(|t| scaled(t, -2.0));
+    let row = s.each_ref().map(|[s0, s1, s2]| sum_of_products([(m0, s0), (m1, s1), (m2, s2)]));
     let rows = upper_rows(&lambda);
     matrix_of_cubics(
         |i, j| [(&row[j], &t[i]), (rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
@@ -265,84 +265,6 @@ pub(crate) fn matrix_of_cubics<'a, const N: usize>(
 #[inline]
 fn interleaved<const N: usize>(x: &[f64; N], y: &[f64; N]) -> [Two; N] {
     std::array::from_fn(|k| Two::new([x[k], y[k]]))
-}
-
-/// Three equations `X(z) x + Y(z) y + W(z) = 0`; coefficients from the constant up.
-pub(crate) struct Resultant {
-    x: [[f64; 4]; 3],
-    y: [[f64; 4]; 3],
-    w: [[f64; 5]; 3],
-}
-
-impl Resultant {
-    /// The three equations, and how far the elimination was from singular.
-    pub(crate) fn new(basis: &[Coordinates; 4], p: f64) -> (Self, f64) {
-        Self::from_cubics(&mut ten_cubics(basis, p))
-    }
-
-    /// The same for any ten cubics over [`CUBIC`] of an essential matrix; they are overwritten.
-    #[inline]
-    pub(crate) fn from_cubics(cubics: &mut [Cubic; 10]) -> (Self, f64) {
-        let pivot = elimination::reduce(cubics, FIRST_USED);
-        let mut out = Self { x: [[0.0; 4]; 3], y: [[0.0; 4]; 3], w: [[0.0; 5]; 3] };
-        for r in 0..3 {
-            // The row led by a monomial times z, less z times the row led by the monomial: no leader is left.
-            let tail = |row: usize| &cubics[FIRST_USED + 2 * r + row][10..];
-            let (with_z, without) = (tail(0), tail(1));
-            for k in 0..3 {
-                out.x[r][k] += with_z[2 - k];
-                out.x[r][k + 1] -= without[2 - k];
-                out.y[r][k] += with_z[5 - k];
-                out.y[r][k + 1] -= without[5 - k];
-            }
-            for k in 0..4 {
-                out.w[r][k] += with_z[9 - k];
-                out.w[r][k + 1] -= without[9 - k];
-            }
-        }
-        (out, pivot)
-    }
-
-    /// The determinant, whose roots are the values of `z`.
-    pub(crate) fn polynomial(&self) -> [f64; 11] {
-        let mut out = [0.0; 11];
-        for r in 0..3 {
-            let (i, j) = ((r + 1) % 3, (r + 2) % 3);
-            let mut minor = [0.0; 7];
-            for a in 0..4 {
-                for b in 0..4 {
-                    minor[a + b] += self.x[i][a] * self.y[j][b] - self.y[i][a] * self.x[j][b];
-                }
-            }
-            for a in 0..7 {
-                for b in 0..5 {
-                    out[a + b] += minor[a] * self.w[r][b];
-                }
-            }
-        }
-        out
-    }
-
-    /// `(x, y, z, w)` at a root, up to scale: the null vector of the three equations.
-    #[inline]
-    pub(crate) fn point<T: Number>(&self, z: T) -> [T; 4] {
-        let m: [[T; 3]; 3] =
-            std::array::from_fn(|r| [horner(&self.x[r], z), horner(&self.y[r], z), horner(&self.w[r], z)]);
-        let cross = |a: &[T; 3], b: &[T; 3]| -> [T; 3] {
-            std::array::from_fn(|k| {
-                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-                a[i] * b[j] - a[j] * b[i]
-            })
-        };
-        let two_of = T::longer(&cross(&m[0], &m[1]), &cross(&m[1], &m[2]));
-        let [x, y, w] = T::longer(&two_of, &cross(&m[2], &m[0]));
-        [x, y, z * w, w]
-    }
-}
-
-#[inline]
-fn horner<T: Number, const N: usize>(p: &[f64; N], z: T) -> T {
-    p[..N - 1].iter().rev().fold(T::real(p[N - 1]), |value, c| value * z + T::real(*c))
 }
 
 /// `x N1 + y N2 + z N3 + w N4`.

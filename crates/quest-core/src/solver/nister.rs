@@ -30,7 +30,7 @@
 //!
 //! **Solutions**: at most ten essential matrices, twenty motions.
 
-use super::cubics::Resultant;
+use super::resultant::Resultant;
 use super::trace_cubics::trace_cubics;
 use super::{Kinds, PoseSolver, five_point};
 use crate::algebra::polynomial::real_roots;
@@ -46,7 +46,7 @@ impl PoseSolver for Nister {
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         five_point::solve(Kinds::Exact, matches, out, |solutions| {
-            let (resultant, pivot) = Resultant::from_cubics(&mut trace_cubics(&solutions.basis));
+            let (resultant, pivot) = Resultant::new(&mut trace_cubics(&solutions.basis));
             let roots = real_roots(&resultant.polynomial());
             for &z in roots.as_slice() {
                 solutions.push_real(&resultant.point(z));

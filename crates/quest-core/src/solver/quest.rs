@@ -8,9 +8,9 @@
 //!    left the motion is a pure rotation.
 //! 2. The null space of the five rows `[n/p, sym(b cᵀ)]`: the essential matrix is `[t]× + p S`, `S` symmetric.
 //! 3. Ten cubics without the factor `p`, a polynomial of degree ten, its real roots by Sturm's theorem
-//!    (derived in `cubics.rs`).
+//!    (`cubics.rs`, `resultant.rs`).
 //! 4. Each root gives an essential matrix, two rotations and a translation; Newton's iteration on the five
-//!    parameters of the motion brings the constraints to zero.
+//!    parameters of the motion brings the constraints to zero, which it knows to twice the digits (`split.rs`).
 //! 5. A complex pair of roots gives two complex quaternions: their real parts. Under noise the true pose often hides there.
 //! 6. Translation and depths with one scale: [`structure`](crate::structure).
 //!
@@ -25,10 +25,11 @@
 use nalgebra::Complex;
 
 use super::aligned::{Alignment, Coordinates};
-use super::cubics::{Resultant, combine};
+use super::cubics::{combine, ten_cubics};
 use super::essential::{decomposed, real_part, twisted};
 use super::gram::Gram;
 use super::motion::Motion;
+use super::resultant::Resultant;
 use super::shortlist::Shortlist;
 use super::two_motions::{TwoMotions, after, apart, normalized};
 use super::{Kinds, PoseSolver, refining};
@@ -118,7 +119,7 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
     if alignment.is_pure_rotation() {
         return None;
     }
-    let mut shortlist = Shortlist::new();
+    let mut shortlist = Shortlist::of_five(&alignment);
     from_five(Kinds::Exact, &alignment, matches, &mut shortlist).ok().map(|()| shortlist)
 }
 
@@ -151,7 +152,7 @@ struct Roots<'a> {
 
 impl<'a> Roots<'a> {
     fn new(basis: &'a [Coordinates; 4], alignment: &'a Alignment) -> Self {
-        let (resultant, pivot) = Resultant::new(basis, alignment.parallax);
+        let (resultant, pivot) = Resultant::new(&mut ten_cubics(basis, alignment.parallax));
         let polynomial = resultant.polynomial();
         let mut real = real_roots(&polynomial);
         real.certain &= pivot > SMALL_PIVOT && !real.close;

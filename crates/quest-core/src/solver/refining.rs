@@ -52,7 +52,7 @@ pub(crate) fn solve(
     if Alignment::all_but_one_turn(five) {
         return out.set_degeneracy(Degeneracy::RankDeficient);
     }
-    let mut shortlist = Shortlist::new();
+    let mut shortlist = Shortlist::of_five(&alignment);
     let found = match one_line::essential_matrices(five) {
         Some(pair) => {
             shortlist.push_essential(&pair, &alignment, five);

@@ -80,6 +80,11 @@ impl Shortlist {
         Self { items: [item; Candidates::CAPACITY], len: 0, same: SAME }
     }
 
+    /// For solutions of five matches, which with little parallax differ by more than [`SAME`] where they are found twice.
+    pub(crate) fn of_five(alignment: &Alignment) -> Self {
+        Self { same: SAME.max(alignment.direction_resolution()), ..Self::new() }
+    }
+
     /// The motions, of two twisted partners one.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Item> {
         self.items[..self.len].iter()

@@ -8,6 +8,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use super::aligned::Alignment;
 use super::essential::decomposed;
 use super::motion::Motion;
+use super::split::{self, Split};
 use crate::Correspondence;
 use crate::algebra::two::{Two, TwoQuaternions, TwoVectors, both, cross, dot, rotation};
 use crate::structure::translation_directions;
@@ -65,7 +66,8 @@ impl TwoMotions {
 
     /// The solutions of five constraints that Newton's iteration leads to; `None` where it does not converge.
     ///
-    /// Not in the epipolar frame: its rounding would be that of the constraints, and with a parallax of 1e-8 shows.
+    /// Not in the epipolar frame: its rounding would be that of the constraints, and with a parallax of 1e-8 shows. What is left of
+    /// the constraints has twice the digits (`split.rs`): in plain `f64` its rounding is twice that of the bearings.
     pub(crate) fn solutions(
         &self,
         alignment: &Alignment,
@@ -102,12 +104,13 @@ impl TwoMotions {
         let t = &self.direction;
         let [e1, e2] = tangent_basis(t);
         let r_21 = rotation(&self.q_21);
+        let essential = essential(t, &r_21).map(|row| row.map(Split::new));
         let equations = matches.each_ref().map(|m| {
             let (a, b) = (both(m.bearing1()), both(m.bearing2()));
             let c = r_21.map(|row| dot(&row, &a));
             let (n, bc, tc) = (cross(&b, &c), dot(&b, &c), dot(t, &c));
             let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
-            [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), -dot(&n, t)]
+            [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), split::form(&b, &essential, &a)]
         });
         let residual = equations.iter().fold(Two::ZERO, |sum, row| sum + row[5] * row[5]);
         let [w1, w2, w3, move1, move2] = solve(equations);
@@ -118,6 +121,15 @@ impl TwoMotions {
         let next = Self { q_21: normalized(&product(&turn, &self.q_21)), direction: normalized(&direction) };
         Step { next, turn: turned, moved, residual }
     }
+}
+
+/// `[t]× R`.
+#[inline]
+fn essential(t: &TwoVectors, r_21: &[TwoVectors; 3]) -> [TwoVectors; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        std::array::from_fn(|l| t[j] * r_21[k][l] - t[k] * r_21[j][l])
+    })
 }
 
 /// `q_21 ⊗ q0_21`.
