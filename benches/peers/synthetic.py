@@ -114,13 +114,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=100)
     parser.add_argument("--seed", type=int, default=2018)
+    parser.add_argument("--matches", type=int, nargs="*", default=[100, 500, 2_000])
+    parser.add_argument("--outliers", type=int, nargs="*", default=[0, 30, 50, 70, 80, 90], help="in per cent")
     arguments = parser.parse_args()
     estimators = {"quest_pose": with_quest, "PoseLib": with_poselib}
     columns = ["success", "AUC@5", "median ms", "mean ms"]
     print("| matches | outliers | " + " | ".join(f"{n} {c}" for n in estimators for c in columns) + " |")
     print("|---|---|" + "---|" * (len(columns) * len(estimators)))
-    for matches in (100, 500, 2_000):
-        for percent in (0, 30, 50, 70, 80, 90):
+    for matches in arguments.matches:
+        for percent in arguments.outliers:
             cells = []
             errors: dict[str, list[float]] = {name: [] for name in estimators}
             times: dict[str, list[float]] = {name: [] for name in estimators}
@@ -136,7 +138,7 @@ def main() -> None:
             for name in estimators:
                 e, t = np.array(errors[name]), np.array(times[name])
                 success, area = 100 * np.mean(e < 5), auc(e, 5)
-                cells += [f"{success:.0f} %", f"{area:.1f}", f"{np.median(t):.2f}", f"{t.mean():.2f}"]
+                cells += [f"{success:.1f} %", f"{area:.1f}", f"{np.median(t):.2f}", f"{t.mean():.2f}"]
             print(f"| {matches:,} | {percent} % | " + " | ".join(cells) + " |", flush=True)
 
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use quest_core::lanes::Loss;
 use quest_core::robust::{self, Estimate, EstimateError, Options, Priors, ThirdView};
 use quest_core::solver::SolverName;
 use quest_core::{Correspondence, InputError};
@@ -14,7 +15,7 @@ use crate::{
     Failure, Outcome, estimate_table,
     in_order::in_order,
     input::InputOptions,
-    options::{OutputOptions, solver_parser},
+    options::{OutputOptions, loss_parser, solver_parser},
     progress::Progress,
     rows, words,
     writer::{Record, Writer},
@@ -71,6 +72,9 @@ pub(crate) struct Arguments {
     /// The solver of the samples; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
+    /// What a match counts, by how far it is off: averaged over all thresholds up to one, or with one threshold (MSAC).
+    #[arg(long, value_name = "LOSS", default_value = Loss::default().name(), value_parser = loss_parser())]
+    loss: Loss,
     /// The matches of view 1 with a third view: of two possible poses the one that agrees with them is taken.
     #[arg(long, value_name = "FILE")]
     third: Option<PathBuf>,
@@ -124,6 +128,7 @@ impl Arguments {
             seed: self.seed,
             index,
             solver: self.solver,
+            loss: self.loss,
             ..Options::default()
         };
         match (&pair.cameras, self.threshold) {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use quest_core::lanes::Loss;
 use quest_core::{
     Camera,
     solver::{Kinds, SolverName},
@@ -99,6 +100,12 @@ pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
 pub(crate) fn kinds_parser() -> impl clap::builder::TypedValueParser<Value = Kinds> {
     use clap::builder::{PossibleValuesParser, TypedValueParser};
     PossibleValuesParser::new(Kinds::CHOICES.map(Kinds::name)).try_map(|name| name.parse::<Kinds>())
+}
+
+/// A loss by its name, with the names listed in the help.
+pub(crate) fn loss_parser() -> impl clap::builder::TypedValueParser<Value = Loss> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    PossibleValuesParser::new(Loss::CHOICES.map(Loss::name)).try_map(|name| name.parse::<Loss>())
 }
 
 /// A solver by its name, with the names listed in the help.

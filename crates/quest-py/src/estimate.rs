@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use pyo3::prelude::*;
 use quest_core::RelativePose;
+use quest_core::lanes::{Loss, UnknownLoss};
 use quest_core::robust::{self, KnownDirection, Options, Priors};
 
 use crate::arrays;
@@ -32,6 +33,9 @@ use crate::solve::{Views, solver_named};
 ///     Which of the pairs that share a seed this is: each has random numbers of its own.
 /// solver : str, optional
 ///     The solver of the samples, one of the names in ``solvers()``; the first of them where absent.
+/// loss : {"marginalised", "truncated"}
+///     What a match counts in the search, by how far it is off: averaged over all thresholds up to one, or with one
+///     threshold (MSAC).
 /// scores : array_like of shape (N,), optional
 ///     One a match, higher is better: the best matches are tried first.
 /// initial_pose : (array_like of shape (3, 3), array_like of shape (3,)), optional
@@ -62,7 +66,7 @@ use crate::solve::{Views, solver_named};
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
-    seed=0, index=0, solver=None, scores=None, initial_pose=None, known_direction=None
+    seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None, known_direction=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
@@ -79,11 +83,12 @@ pub(crate) fn estimate(
     seed: u64,
     index: u64,
     solver: Option<&str>,
+    loss: &str,
     scores: Option<&Bound<'_, PyAny>>,
     initial_pose: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     known_direction: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>, f64)>,
 ) -> PyResult<Estimate> {
-    let solver = solver_named(solver)?;
+    let (solver, loss) = (solver_named(solver)?, loss_named(loss)?);
     let views = Views::new(x1, x2, camera1, camera2)?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     let pose = initial_pose.as_ref().map(pose).transpose()?;
@@ -96,6 +101,7 @@ pub(crate) fn estimate(
         seed,
         index,
         solver,
+        loss,
         ..Options::default()
     };
     let options = match views.cameras() {
@@ -108,6 +114,11 @@ pub(crate) fn estimate(
         robust::estimate_with(&matches, &options, &priors).map_err(|error| errors::estimate(&error))
     })?;
     Ok(Estimate::new(&found))
+}
+
+/// The loss of this name.
+pub(crate) fn loss_named(name: &str) -> PyResult<Loss> {
+    name.parse().map_err(|error: UnknownLoss| QuestError::new_err(error.to_string()))
 }
 
 /// The threshold: one pixel where there are cameras.

@@ -55,6 +55,7 @@ CASES: list[tuple[Callable[[], object], type[Exception], list[str]]] = [
     (lambda: qp.solve(X1, X2, -K), qp.BadCamera, ["camera1", "-1"]),
     (lambda: qp.solve(X1, X2, K, np.full((3, 3), np.nan)), qp.BadCamera, ["camera2", "NaN"]),
     (lambda: qp.solve(X1, X2, solver="orb"), qp.QuestError, ["orb", *(s.name for s in qp.solvers())]),
+    (lambda: qp.estimate(X1, X2, threshold=1, loss="huber"), qp.QuestError, ["huber", "marginalised", "truncated"]),  # type: ignore[arg-type]
     (lambda: qp.solve(X1, X2, kinds="real"), qp.QuestError, ["real", "all", "exact", "planar"]),  # type: ignore[arg-type]
     (lambda: qp.solve(with_value(1e9), X2), qp.DegenerateInput, ["match 3", "view 1", "1e9"]),
     (lambda: qp.solve(SCENE.X1 * 0, SCENE.X2), qp.DegenerateInput, ["match 0", "view 1", "length"]),

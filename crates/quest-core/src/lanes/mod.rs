@@ -84,4 +84,4 @@ mod vector;
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
 pub use instructions::Instructions;
-pub use score::{BearingMatches, ImageMatches, Loss, MatchColumns, Real, Score, Scorer, Stop};
+pub use score::{BearingMatches, ImageMatches, Loss, MatchColumns, Real, Score, Scorer, Stop, UnknownLoss};

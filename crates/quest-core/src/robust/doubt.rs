@@ -136,6 +136,7 @@ impl Usual {
 mod tests {
     use super::*;
     use crate::Correspondence;
+    use crate::lanes::Loss;
     use crate::robust::polish::polish;
     use crate::simulate::{self, FOCAL_LENGTH, Scene, SceneOptions};
     use nalgebra::Vector3;
@@ -163,7 +164,7 @@ mod tests {
     fn refined(scene: &Scene, start: Motion) -> (Vec<u32>, [Motion; 2]) {
         let order = (0..scene.matches.len()).collect();
         let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2]);
-        let mut poses = PoseScorer::new(&observations, 1.5);
+        let mut poses = PoseScorer::new(&observations, 1.5, Loss::default());
         let mut polished = polish(&mut poses, start);
         let before = polished.scored.motion;
         poses.score(before, 1.5);

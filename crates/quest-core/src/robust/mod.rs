@@ -174,7 +174,7 @@ fn search<'a>(
     priors: &Priors,
     rng: ChaCha8Rng,
 ) -> Search<'a> {
-    let mut search = Search::new(observations, options.solver, options.threshold, priors.direction);
+    let mut search = Search::new(observations, options, priors.direction);
     if let Some(pose) = priors.pose
         && let Some(direction) = pose.t_21.try_normalize(0.0)
     {

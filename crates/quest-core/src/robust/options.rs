@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::observations::Observations;
+use crate::lanes::Loss;
 use crate::solver::SolverName;
 use crate::{Camera, InputError, RelativePose};
 
@@ -19,6 +20,8 @@ pub struct Options {
     /// `fx, fy` of view 1 and of view 2, in pixels. With all of them 1 the threshold is in units of the plane `z = 1`, or
     /// in radians for bearings.
     pub focal_lengths: [[f64; 2]; 2],
+    /// What a match counts in the search, by how far it is off.
+    pub loss: Loss,
     /// How sure the search is to be that it has seen a good sample before it stops, in `(0, 1)`.
     pub confidence: f64,
     /// At least so many samples are drawn.
@@ -39,6 +42,7 @@ impl Default for Options {
         Self {
             threshold: 1e-3,
             focal_lengths: [[1.0; 2]; 2],
+            loss: Loss::default(),
             confidence: 0.9999,
             min_iterations: 300,
             max_iterations: 100_000,

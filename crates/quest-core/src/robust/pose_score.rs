@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::columns::{Look, POSES};
 use super::observations::Observations;
-use super::score::{REACH, loss};
+use super::score::{MANY, REACH, cost};
+use crate::lanes::Loss;
 use crate::solver::essential::decompose;
 use crate::solver::motion::Motion;
 
@@ -32,6 +33,7 @@ pub(super) struct PoseScorer<'a> {
     pub(super) observations: &'a Observations,
     /// The inlier threshold in pixels.
     pub(super) threshold: f64,
+    loss: Loss,
     /// The residuals of the pose that was scored last, in pixels, and on which side of the cameras its points are.
     look: Look,
     /// Its matches within the limit asked for that are in front of both cameras, in order.
@@ -39,8 +41,9 @@ pub(super) struct PoseScorer<'a> {
 }
 
 impl<'a> PoseScorer<'a> {
-    pub(super) fn new(observations: &'a Observations, threshold: f64) -> Self {
-        Self { observations, threshold, look: Look::default(), inliers: Vec::new() }
+    pub(super) fn new(observations: &'a Observations, threshold: f64, loss: Loss) -> Self {
+        let loss = if observations.len() < MANY { Loss::Truncated } else { loss };
+        Self { observations, threshold, loss, look: Look::default(), inliers: Vec::new() }
     }
 
     /// The best of the four poses of an essential matrix. [`Self::inliers`] are those within `limit` pixels.
@@ -89,18 +92,18 @@ impl<'a> PoseScorer<'a> {
         let reach = REACH * self.threshold;
         let judged = limit.max(reach);
         let count = self.look.residuals.len();
-        let (mut cost, mut support, mut found) = (0.0, 0, 0);
+        let (mut sum, mut support, mut found) = (0.0, 0, 0);
         self.inliers.resize(count, 0);
         for (i, (index, r)) in (0_u32..).zip(&self.look.residuals).enumerate() {
             let r = r.abs();
             let is_in_front = self.look.is_in_front(i, pose);
-            cost += if r < judged && !is_in_front { 1.0 } else { loss(r / reach, count) };
+            sum += if r < judged && !is_in_front { 1.0 } else { cost(self.loss, r / reach) };
             support += usize::from(is_in_front && r < SUPPORT * self.threshold);
             // Written in any case, which takes less time than to ask.
             self.inliers[found] = index;
             found += usize::from(is_in_front && r < limit);
         }
         self.inliers.truncate(found);
-        Scored { motion, cost, support }
+        Scored { motion, cost: sum, support }
     }
 }

@@ -1,12 +1,14 @@
 //! How well a motion explains all matches: one number, zero for perfect and one a match at worst.
 //!
-//! The loss of a residual `r` is the truncated square averaged over all thresholds up to `T`,
+//! The loss of a residual `r` is one of
 //!
 //! ```text
-//! ρ(u) = 2u − u²,   u = min(|r| / T, 1)
+//! ρ(u) = 2u − u²    marginalised        ρ(u) = u²    truncated,        u = min(|r| / T, 1)
 //! ```
 //!
-//! which does not hang on one threshold (the idea of MAGSAC: D. Barath, J. Matas, J. Noskova, CVPR 2019, in one dimension).
+//! The first is the second averaged over all thresholds up to `T`, so that it does not hang on one of them (the idea of MAGSAC:
+//! D. Barath, J. Matas, J. Noskova, CVPR 2019, in one dimension). The second is that of MSAC (P. H. S. Torr, A. Zisserman,
+//! *MLESAC*, CVIU 2000).
 
 use nalgebra::Matrix3;
 
@@ -23,10 +25,13 @@ const LEAST_MEAN: f64 = 0.03;
 /// not be rewarded for being small.
 pub(super) const MANY: usize = 10;
 
-/// The loss of a residual in units of the reach, for one of `count` matches.
-pub(super) fn loss(u: f64, count: usize) -> f64 {
+/// The loss of a residual in units of the reach.
+pub(super) fn cost(loss: Loss, u: f64) -> f64 {
     let u = u.abs().min(1.0);
-    if count < MANY { u * u } else { u * (2.0 - u) }
+    match loss {
+        Loss::Truncated => u * u,
+        Loss::Marginalised => u * (2.0 - u),
+    }
 }
 
 /// The matches as the kernels take them.
@@ -41,6 +46,7 @@ enum Columns {
 pub(super) struct Scorer<'a> {
     observations: &'a Observations,
     kernel: lanes::Scorer,
+    loss: Loss,
     columns: Columns,
     /// `T` in the unit of the columns.
     reach: f64,
@@ -48,7 +54,7 @@ pub(super) struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     /// `threshold` in pixels.
-    pub(super) fn new(observations: &'a Observations, threshold: f64) -> Self {
+    pub(super) fn new(observations: &'a Observations, threshold: f64, loss: Loss) -> Self {
         let reach = REACH * threshold;
         let matches = &observations.matches;
         let kernel = lanes::Scorer::new();
@@ -59,14 +65,15 @@ impl<'a> Scorer<'a> {
             }
             // One angle for both views: an exact weight would have to know which view a residual comes from.
             let angle = (0.5 * observations.square_angle_of_pixel()).sqrt();
-            return Self { observations, kernel, columns: Columns::Sphere(columns), reach: reach * angle };
+            let (columns, reach) = (Columns::Sphere(columns), reach * angle);
+            return Self { observations, kernel, loss, columns, reach };
         }
         let mut columns = ImageMatches::new();
         let [x1, y1, _, x2, y2, _] = observations.columns.all();
         for i in 0..matches.len() {
             columns.push([x1[i], y1[i]], [x2[i], y2[i]]);
         }
-        Self { observations, kernel, columns: Columns::Plane(columns), reach }
+        Self { observations, kernel, loss, columns: Columns::Plane(columns), reach }
     }
 
     /// The summed loss of an essential matrix, `None` where it is not below `best`, or most likely is not.
@@ -76,11 +83,9 @@ impl<'a> Scorer<'a> {
         let score = match &self.columns {
             Columns::Plane(columns) => {
                 let f = rows(&self.observations.fundamental(e));
-                self.kernel.score(columns, &f, self.reach, Loss::Marginalised, stop)
+                self.kernel.score(columns, &f, self.reach, self.loss, stop)
             }
-            Columns::Sphere(columns) => {
-                self.kernel.score(columns, &rows(e), self.reach, Loss::Marginalised, stop)
-            }
+            Columns::Sphere(columns) => self.kernel.score(columns, &rows(e), self.reach, self.loss, stop),
         };
         let loss = count - score.sum;
         (score.visited == self.observations.len() && loss < best).then_some(loss)

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::loss::Biweight;
 use super::observations::Observations;
-use super::options::KnownDirection;
+use super::options::{KnownDirection, Options};
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{COARSE, Subset, refine};
 use super::sampling::{MAX_SAMPLE, Sampler};
@@ -76,13 +76,12 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// `threshold` in pixels.
     pub(super) fn new(
         observations: &'a Observations,
-        solver: SolverName,
-        threshold: f64,
+        options: &Options,
         direction: Option<KnownDirection>,
     ) -> Self {
+        let Options { threshold, loss, solver, .. } = *options;
         Self {
             observations,
             solver,
@@ -90,8 +89,8 @@ impl<'a> Search<'a> {
             essentials: Essentials::new(),
             samples: Vec::new(),
             direction,
-            scorer: Scorer::new(observations, threshold),
-            poses: PoseScorer::new(observations, threshold),
+            scorer: Scorer::new(observations, threshold, loss),
+            poses: PoseScorer::new(observations, threshold, loss),
             best_hypothesis: observations.len() as f64,
             best: None,
             all: Vec::new(),

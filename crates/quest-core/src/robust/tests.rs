@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
+use crate::lanes::Loss;
 use crate::simulate::{FOCAL_LENGTH, Layout, Motion as SceneMotion, Scene, SceneOptions};
 use crate::solver::SolverName;
 use crate::{Camera, CameraModel, RelativePose, correspondence};
@@ -32,9 +33,12 @@ fn errors(pose: &RelativePose, truth: &RelativePose) -> [f64; 2] {
 
 #[test]
 fn planted_poses_are_found_among_outliers() {
-    for (outliers, index) in [(0.0, 0), (0.3, 1), (0.5, 2), (0.7, 3)] {
+    let loss = Loss::Marginalised;
+    for (outliers, index, loss) in
+        [(0.0, 0, loss), (0.3, 1, loss), (0.5, 2, loss), (0.7, 3, loss), (0.5, 4, Loss::Truncated)]
+    {
         let (scene, is_true) = scene(&noisy(200), outliers, index);
-        let found = estimate(&scene.matches, &options()).unwrap();
+        let found = estimate(&scene.matches, &Options { loss, ..options() }).unwrap();
         assert_eq!(found.model, Model::General, "{outliers}");
         let [r, t] = errors(&found.pose, &scene.truth);
         // Half a pixel is 0.03° and averages out over dozens of points.

@@ -241,6 +241,7 @@ def estimate(
     seed: int = 0,
     index: int = 0,
     solver: str | None = None,
+    loss: Literal["marginalised", "truncated"] = "marginalised",
     scores: ArrayLike | None = None,
     initial_pose: tuple[ArrayLike, ArrayLike] | None = None,
     known_direction: tuple[ArrayLike, ArrayLike, float] | None = None,
@@ -259,6 +260,7 @@ def estimate_batch(
     seed: int = 0,
     first_index: int = 0,
     solver: str | None = None,
+    loss: Literal["marginalised", "truncated"] = "marginalised",
     num_threads: int = 0,
 ) -> EstimateBatch: ...
 def _estimate(state: tuple[Any, ...]) -> Estimate: ...

@@ -25,6 +25,8 @@
 mod columns;
 mod kernel;
 
+use std::str::FromStr;
+
 pub use columns::{BearingMatches, ImageMatches, MatchColumns, Real};
 
 use columns::BLOCK;
@@ -34,12 +36,44 @@ use super::instructions::{Instructions, Token};
 
 /// What a match within the threshold counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Loss {
     /// `1 − (r/T)²`.
     Truncated,
     /// `(1 − r/T)²`.
     #[default]
     Marginalised,
+}
+
+impl Loss {
+    /// Every choice, the default first.
+    pub const CHOICES: [Self; 2] = [Self::Marginalised, Self::Truncated];
+
+    /// The name on the command line, in Python and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Truncated => "truncated",
+            Self::Marginalised => "marginalised",
+        }
+    }
+}
+
+/// No loss has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("loss is {found:?}, expected one of {}", Loss::CHOICES.map(Loss::name).join(", "))]
+pub struct UnknownLoss {
+    /// The name that was asked for.
+    pub found: String,
+}
+
+impl FromStr for Loss {
+    type Err = UnknownLoss;
+
+    fn from_str(name: &str) -> Result<Self, UnknownLoss> {
+        let found = Self::CHOICES.into_iter().find(|loss| loss.name() == name);
+        found.ok_or_else(|| UnknownLoss { found: name.to_owned() })
+    }
 }
 
 /// When the matches that are left are not looked at any more. Asked after every 64 matches.
