@@ -195,22 +195,20 @@ impl Forms {
         ]
     }
 
-    /// `det(tr(S) I − 2 S)`.
+    /// `det(tr(S) I − 2 S)`, as products whose sum it is; the last one is zero.
     #[inline]
-    fn tenth(&self) -> Cubic {
+    fn tenth(&self) -> [(Quadratic, Linear); 4] {
         let mut d = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, -2.0)));
         for i in 0..3 {
             for m in 0..4 {
                 d[i][i][m] += self.s[0][0][m] + self.s[1][1][m] + self.s[2][2][m];
             }
         }
-        let mut out = [0.0; 20];
-        for j in 0..3 {
+        let product = |j: usize| {
             let (a, b) = ((j + 1) % 3, (j + 2) % 3);
-            let minor = sum_of_products([(&d[1][a], &d[2][b]), (&scaled(&d[1][b], -1.0), &d[2][a])]);
-            add_product(&mut out, &minor, &d[0][j]);
-        }
-        out
+            (sum_of_products([(&d[1][a], &d[2][b]), (&scaled(&d[1][b], -1.0), &d[2][a])]), d[0][j])
+        };
+        [product(0), product(1), product(2), ([0.0; 10], [0.0; 4])]
     }
 }
 
@@ -225,7 +223,7 @@ pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let rows = upper_rows(&lambda);
     matrix_of_cubics(
         |i, j| [(&row[j], &t[i]), (rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
-        forms.tenth(),
+        &forms.tenth(),
     )
 }
 
@@ -235,15 +233,15 @@ pub(crate) fn upper_rows(m: &[[Quadratic; 3]; 3]) -> [[&Quadratic; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| &m[i.min(j)][i.max(j)]))
 }
 
-/// Entries of a 3 × 3 matrix that are computed side by side; the last one stands alone.
+/// Entries of a 3 × 3 matrix that are computed side by side; beside the last one stands the tenth cubic.
 const SIDE_BY_SIDE: [[(usize, usize); 2]; 4] =
     [[(0, 0), (0, 1)], [(1, 0), (1, 1)], [(2, 0), (2, 1)], [(0, 2), (1, 2)]];
 
-/// The cubics of a 3 × 3 matrix row by row, each entry a sum of products, and a tenth behind them.
+/// The cubics of a 3 × 3 matrix row by row and a tenth behind them, each a sum of products.
 #[inline]
 pub(crate) fn matrix_of_cubics<'a, const N: usize>(
     terms: impl Fn(usize, usize) -> [(&'a Quadratic, &'a Linear); N],
-    tenth: Cubic,
+    tenth: &'a [(Quadratic, Linear); N],
 ) -> [Cubic; 10] {
     let mut out = [[0.0; 20]; 10];
     for [(i, j), (k, l)] in SIDE_BY_SIDE {
@@ -255,10 +253,13 @@ pub(crate) fn matrix_of_cubics<'a, const N: usize>(
             [out[3 * i + j][n], out[3 * k + l][n]] = two.to_array();
         }
     }
-    for (a, b) in terms(2, 2) {
-        add_product(&mut out[8], a, b);
+    let mut two = [Two::ZERO; 20];
+    for ((a, b), (c, d)) in terms(2, 2).into_iter().zip(tenth) {
+        add_product(&mut two, &interleaved(a, c), &interleaved(b, d));
     }
-    out[9] = tenth;
+    for (n, two) in two.into_iter().enumerate() {
+        [out[8][n], out[9][n]] = two.to_array();
+    }
     out
 }
 

@@ -10,9 +10,7 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::cubics::{
-    Cubic, Linear, Quadratic, add_linear_product, add_product, matrix_of_cubics, scaled, upper_rows,
-};
+use super::cubics::{Cubic, Linear, Quadratic, add_linear_product, matrix_of_cubics, scaled, upper_rows};
 
 /// Four essential matrices, row by row.
 pub(crate) type Basis = [[f64; 9]; 4];
@@ -25,7 +23,7 @@ pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
     let rows = upper_rows(&product);
     matrix_of_cubics(
         |i, j| [(rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
-        determinant(&e),
+        &determinant(&e),
     )
 }
 
@@ -50,17 +48,16 @@ fn half_traceless_square(e: &[[Linear; 3]; 3]) -> [[Quadratic; 3]; 3] {
     product
 }
 
+/// `det E`, as products whose sum it is.
 #[inline]
-fn determinant(e: &[[Linear; 3]; 3]) -> Cubic {
-    let mut out = [0.0; 20];
-    for j in 0..3 {
+fn determinant(e: &[[Linear; 3]; 3]) -> [(Quadratic, Linear); 3] {
+    std::array::from_fn(|j| {
         let (a, b) = ((j + 1) % 3, (j + 2) % 3);
         let mut minor = [0.0; 10];
         add_linear_product(&mut minor, &e[1][a], &e[2][b]);
         add_linear_product(&mut minor, &scaled(&e[1][b], -1.0), &e[2][a]);
-        add_product(&mut out, &minor, &e[0][j]);
-    }
-    out
+        (minor, e[0][j])
+    })
 }
 
 #[cfg(test)]

@@ -204,25 +204,14 @@ fn tangent_basis(t: &TwoVectors) -> [TwoVectors; 2] {
 /// where they are singular.
 #[inline]
 fn solve(mut m: [[Two; 6]; 5]) -> [Two; 5] {
-    let mut x = [Two::ZERO; 5];
-    for k in 0..5 {
-        for i in k + 1..5 {
-            let is_larger = m[i][k].abs().simd_gt(m[k][k].abs());
-            for j in k..6 {
-                let exchanged = (m[i][j] ^ m[k][j]) & is_larger;
-                m[i][j] ^= exchanged;
-                m[k][j] ^= exchanged;
-            }
-        }
-        // Kept for the way back.
-        x[k] = Two::splat(1.0) / m[k][k];
-        for i in k + 1..5 {
-            let factor = m[i][k] * x[k];
-            for j in k + 1..6 {
-                m[i][j] -= factor * m[k][j];
-            }
-        }
-    }
+    // The reciprocals of the pivots, kept for the way back.
+    let mut x = [
+        eliminate::<0>(&mut m),
+        eliminate::<1>(&mut m),
+        eliminate::<2>(&mut m),
+        eliminate::<3>(&mut m),
+        eliminate::<4>(&mut m),
+    ];
     for k in (0..5).rev() {
         let mut sum = m[k][5];
         for j in k + 1..5 {
@@ -231,6 +220,29 @@ fn solve(mut m: [[Two; 6]; 5]) -> [Two; 5] {
         x[k] *= sum;
     }
     x
+}
+
+/// Eliminates unknown `K` from the equations behind equation `K`; returns the reciprocal of the pivot.
+///
+/// A constant, so that the compiler knows the length of every loop.
+#[inline]
+fn eliminate<const K: usize>(m: &mut [[Two; 6]; 5]) -> Two {
+    for i in K + 1..5 {
+        let is_larger = m[i][K].abs().simd_gt(m[K][K].abs());
+        for j in K..6 {
+            let exchanged = (m[i][j] ^ m[K][j]) & is_larger;
+            m[i][j] ^= exchanged;
+            m[K][j] ^= exchanged;
+        }
+    }
+    let inverse = Two::splat(1.0) / m[K][K];
+    for i in K + 1..5 {
+        let factor = m[i][K] * inverse;
+        for j in K + 1..6 {
+            m[i][j] -= factor * m[K][j];
+        }
+    }
+    inverse
 }
 
 #[cfg(test)]

@@ -79,7 +79,9 @@ impl<const N: usize> Brackets<N> {
         for _ in 0..MAX_STEPS {
             let mut is_done = true;
             for pair in &mut *pairs {
-                is_done &= pair.step(p);
+                if !pair.is_near.all() {
+                    is_done &= pair.step(p);
+                }
             }
             if is_done {
                 break;
@@ -123,7 +125,7 @@ impl TwoBrackets {
         }
     }
 
-    /// A step of both unless they are near already. Whether they are then.
+    /// A step of each that is not near already. Whether both are then.
     #[inline]
     fn step<const N: usize>(&mut self, p: &[f64; N]) -> bool {
         let Self { x, .. } = *self;
