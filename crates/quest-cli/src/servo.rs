@@ -169,7 +169,17 @@ impl Arguments {
     }
 }
 
-/// Run number `index`: the robot's first start is the paper's, the others are random.
+/// About how far the features are, in metres.
+const UNIT: f64 = 2.0;
+
+/// Random starts that are tried: with very many features hardly one keeps them all in view.
+const START_TRIES: usize = 200;
+
+/// A minute at 30 Hz.
+const ROBOT_IMAGES: usize = 1_800;
+
+/// Run number `index`: the robot's first start is the paper's; the others are random ones from which it can see all features on
+/// its way.
 fn simulate(arguments: &Arguments, index: u64) -> Run {
     let features = if arguments.coplanar { Features::Coplanar } else { Features::General };
     let count = usize::from(arguments.features);
@@ -183,26 +193,37 @@ fn simulate(arguments: &Arguments, index: u64) -> Run {
     let limits = Limits { speed: 0.5, turn_rate: 0.6 };
     let setup = |mut world: World, images, plane, rng| {
         world.goal_images = usize::from(arguments.goal_images);
-        Setup { world, limits, images, unit: 2.0, plane, rng }
+        Setup { world, limits, images, unit: UNIT, plane, rng }
     };
     match arguments.scenario {
         Scenario::Paper => {
             let (mut world, plant) = scenario::paper();
             world.disturbances = disturbances;
-            drive(arguments, setup(world, 1_400, None, rng), plant, FreeCameraLaw { rate: 0.25, unit: 2.0 })
+            drive(arguments, setup(world, 1_400, None, rng), plant, FreeCameraLaw { rate: 0.25, unit: UNIT })
         }
         Scenario::Random => {
             let (world, plant) =
                 scenario::random(features, count, &disturbances, &mut rng, scenario::random_camera);
-            drive(arguments, setup(world, 600, None, rng), plant, FreeCameraLaw { rate: 0.3, unit: 2.0 })
+            drive(arguments, setup(world, 600, None, rng), plant, FreeCameraLaw { rate: 0.3, unit: UNIT })
         }
         Scenario::Robot => {
-            let (mut world, plant) = scenario::random(features, count, &disturbances, &mut rng, |rng| {
-                if index == 0 { scenario::robot_start(features) } else { scenario::random_robot(rng) }
-            });
-            world.period = 1.0 / 30.0;
+            let law = DifferentialDriveLaw::default;
+            let mut start = || {
+                let (world, plant) = scenario::random(features, count, &disturbances, &mut rng, |rng| {
+                    if index == 0 { scenario::robot_start(features) } else { scenario::random_robot(rng) }
+                });
+                (World { period: 1.0 / 30.0, ..world }, plant)
+            };
+            let (mut world, mut plant) = start();
+            let tries = if index > 0 { START_TRIES } else { 0 };
+            for _ in 0..tries {
+                if world.stays_in_view(plant, law(), &limits, UNIT, ROBOT_IMAGES) {
+                    break;
+                }
+                (world, plant) = start();
+            }
             let plane = Some(Plane { tilt: 0.002, height: 0.001 });
-            drive(arguments, setup(world, 1_800, plane, rng), plant, DifferentialDriveLaw::default())
+            drive(arguments, setup(world, ROBOT_IMAGES, plane, rng), plant, law())
         }
     }
 }

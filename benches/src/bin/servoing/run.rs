@@ -1,6 +1,5 @@
 //! One run of the closed loop, and how it ends.
 
-use quest_core::RelativePose;
 use quest_core::servo::scenario;
 use quest_core::servo::{
     ControlLaw, DepthFilter, DifferentialDriveLaw, FilterOptions, FreeCameraLaw, Limits, PerFrame, Plane,
@@ -83,14 +82,7 @@ impl Cell {
             let (mut world, plant) =
                 scenario::random(self.features, self.count, &self.disturbances, rng, &start);
             world.goal_images = self.goal_images;
-            let (mut moving, mut law) = (plant.clone(), law());
-            let stays = (0..IMAGES).all(|_| {
-                let pose = moving.pose();
-                let command = law.command(&RelativePose::new(pose.q_21, pose.t_21 / UNIT));
-                moving.advance(&LIMITS.apply(&command), world.period);
-                world.sees_all(&pose, 0.0)
-            });
-            if stays {
+            if world.stays_in_view(plant.clone(), law(), &LIMITS, UNIT, IMAGES) {
                 return (world, plant);
             }
         }

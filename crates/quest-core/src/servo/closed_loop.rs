@@ -92,6 +92,24 @@ impl World {
         imaging.project(pose).all(|pixel| pixel.is_some_and(|p| imaging.is_inside(p, margin)))
     }
 
+    /// Whether a law that is told the true pose, with `unit` metres for one, keeps all features in view for so many images.
+    #[must_use]
+    pub fn stays_in_view(
+        &self,
+        mut plant: impl Plant,
+        mut law: impl ControlLaw,
+        limits: &Limits,
+        unit: f64,
+        images: usize,
+    ) -> bool {
+        (0..images).all(|_| {
+            let pose = plant.pose();
+            let command = law.command(&RelativePose::new(pose.q_21, pose.t_21 / unit));
+            plant.advance(&limits.apply(&command), self.period);
+            self.sees_all(&pose, 0.0)
+        })
+    }
+
     /// Runs the loop for so many images; `watch` sees each and may end the run by returning `false`.
     pub fn run<E: PoseEstimator, L: ControlLaw>(
         &self,
