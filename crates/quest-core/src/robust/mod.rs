@@ -27,26 +27,18 @@
 //! # Noise
 //! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
 //! as fisheye cameras do, the same angle. Residuals are Sampson errors in pixels of the focal lengths.
+#![expect(
+    clippy::inline_always,
+    reason = "a call would leave the instructions that a loop was dispatched to (`widest`)"
+)]
 
 mod batch;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod columns;
 mod covariance;
 mod doubt;
 mod estimate;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod framed;
 mod length;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod loss;
 mod model;
 mod noise;
@@ -55,10 +47,6 @@ mod options;
 mod plane;
 mod polish;
 mod pose_score;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod refine;
 mod sampling;
 mod score;
@@ -68,16 +56,8 @@ mod stopping;
 #[cfg(test)]
 mod tests;
 mod third_view;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod transfer;
 mod verdict;
-#[expect(
-    clippy::inline_always,
-    reason = "a call would leave the instructions that the loop was dispatched to"
-)]
 mod widest;
 
 use rand::seq::SliceRandom;
