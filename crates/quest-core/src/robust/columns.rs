@@ -57,6 +57,11 @@ impl Columns {
         &self.all
     }
 
+    /// The two views, both planes or both spheres.
+    pub(super) fn images(&self) -> [Image; 2] {
+        self.images
+    }
+
     pub(super) fn is_sphere(&self) -> bool {
         matches!(self.images[0], Image::Sphere(_))
     }

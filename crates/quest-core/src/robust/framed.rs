@@ -103,6 +103,7 @@ impl Work for SquareErrors<'_> {
     }
 }
 
+/// The entries row by row, as the kernels take them.
 pub(super) fn rows(m: &Matrix3<f64>) -> [f64; 9] {
     std::array::from_fn(|k| m[(k / 3, k % 3)])
 }

@@ -54,8 +54,6 @@ pub(super) struct Observations {
     pub(super) matches: Vec<Correspondence>,
     /// Where each of them stands in the caller's order.
     pub(super) order: Vec<usize>,
-    /// The two views, both planes or both spheres.
-    pub(super) images: [Image; 2],
     /// The same matches in columns.
     pub(super) columns: Columns,
 }
@@ -78,8 +76,7 @@ impl Observations {
                 column.push(*x);
             }
         }
-        let columns = Columns::new(images, columns);
-        Self { matches, order, images, columns }
+        Self { matches, order, columns: Columns::new(images, columns) }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -92,13 +89,14 @@ impl Observations {
 
     /// `F = D2 E D1`, of unit norm.
     pub(super) fn fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
-        let [d1, d2] = self.images.map(Image::inverse_scale);
+        let [d1, d2] = self.columns.inverse_scales();
         Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j]).normalize()
     }
 
     /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
     pub(super) fn is_line(&self, some: &[Correspondence], threshold: f64) -> bool {
-        nearly_on_a_line(some, self.images.map(|image| threshold / image.square_focal_length().sqrt()))
+        let images = self.columns.images();
+        nearly_on_a_line(some, images.map(|image| threshold / image.square_focal_length().sqrt()))
     }
 
     /// The squared angle, in radians, that a pixel in both views stands for.
@@ -128,9 +126,10 @@ impl Observations {
 
     /// Some of the matches with the frames of both views.
     pub(super) fn framed(&self, indices: &[u32]) -> Framed {
+        let [image1, image2] = self.columns.images();
         let framed = |&index: &u32| {
             let [x1, x2] = self.vectors(index as usize);
-            FramedMatch { x1, x2, frame1: self.images[0].frame(&x1), frame2: self.images[1].frame(&x2) }
+            FramedMatch { x1, x2, frame1: image1.frame(&x1), frame2: image2.frame(&x2) }
         };
         Framed::new(&indices.iter().map(framed).collect::<Vec<_>>())
     }

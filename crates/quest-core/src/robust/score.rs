@@ -12,6 +12,7 @@
 
 use nalgebra::Matrix3;
 
+use super::framed::rows;
 use super::observations::Observations;
 use crate::lanes::{self, BearingMatches, ImageMatches, Loss, Stop};
 
@@ -90,8 +91,4 @@ impl<'a> Scorer<'a> {
         let loss = count - score.sum;
         (score.visited == self.observations.len() && loss < best).then_some(loss)
     }
-}
-
-fn rows(m: &Matrix3<f64>) -> [f64; 9] {
-    std::array::from_fn(|k| m[(k / 3, k % 3)])
 }
