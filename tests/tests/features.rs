@@ -81,6 +81,8 @@ fn what_is_wrong_is_refused() {
     assert!((seven_digits.q_21.norm() - 1.0).abs() < 1e-15);
     let camera = |text: &str| serde_json::from_str::<Camera>(text).unwrap_err().to_string();
     assert!(camera(r#"{"model": "PINHOLE", "params": [1, 1, 0]}"#).contains("4 parameters"));
+    let half = camera(r#"{"model": "PINHOLE", "width": 640, "params": [1, 1, 0, 0]}"#);
+    assert!(half.contains("640") && half.contains('0'), "{half}");
     assert!(camera(r#"{"model": "FISH", "params": [1, 1, 0]}"#).contains("unknown variant `FISH`"));
     let error = serde_json::from_str::<Options>(r#"{"treshold": 1}"#).unwrap_err().to_string();
     assert!(error.contains("unknown field `treshold`"), "{error}");

@@ -68,8 +68,9 @@ impl TryFrom<CameraForm> for Camera {
     fn try_from(form: CameraForm) -> Result<Self, CameraError> {
         let camera = Self::new(form.model, &form.params)?;
         match (form.width, form.height) {
-            (Some(width), Some(height)) => camera.with_size(width, height),
-            _ => Ok(camera),
+            (None, None) => Ok(camera),
+            // One without the other is no size.
+            (width, height) => camera.with_size(width.unwrap_or(0), height.unwrap_or(0)),
         }
     }
 }
