@@ -12,10 +12,12 @@
 
 use std::array::from_fn;
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::{smallest_eigenvector_3, smallest_eigenvectors_3};
-use crate::algebra::two::{Two, TwoVectors, both, cross, dot, rotation, side_by_side};
+use crate::algebra::two::{
+    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, rotation, scaled, side_by_side,
+};
 use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
 
@@ -68,35 +70,57 @@ pub fn with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Completed {
-    let r_21 = q_21.to_rotation_matrix();
-    let r_21 = from_fn(|i| from_fn(|j| Two::splat(r_21[(i, j)])));
-    let t = both(direction);
+    let q = q_21.quaternion();
+    let (q, t) = ([q.w, q.i, q.j, q.k].map(Two::splat), both(direction));
+    let r_21 = rotation(&q);
     let mut tally = Tally::default();
     for pair in matches.chunks(2) {
         let second = pair.get(1);
         let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
         let b = side_by_side(pair[0].bearing2(), second.map(Correspondence::bearing2));
-        let length1 = Two::new([pair[0].length1(), second.map_or(1.0, Correspondence::length1)]);
-        let length2 = Two::new([pair[0].length2(), second.map_or(1.0, Correspondence::length2)]);
-        tally.add(&Rays::new(&a, &b, &r_21, &t), length1, length2);
+        let lengths = [
+            Two::new([pair[0].length1(), second.map_or(1.0, Correspondence::length1)]),
+            Two::new([pair[0].length2(), second.map_or(1.0, Correspondence::length2)]),
+        ];
+        tally.add(&Rays::new(&a, &b, &r_21, &t), &lengths);
     }
-    tally.sums(Two::reduce_add).completed(q_21, direction, matches)
+    let [completed, _] = tally.map(|sum| Two::splat(sum.reduce_add())).completed(&q, &t, matches);
+    completed
 }
 
 /// The same for two rotations and directions side by side.
 pub(crate) fn two_with_depths(
-    q_21: &[UnitQuaternion<f64>; 2],
-    direction: &[Vector3<f64>; 2],
+    q_21: &TwoQuaternions,
+    direction: &TwoVectors,
     matches: &[Correspondence],
 ) -> [Completed; 2] {
-    let r_21 = rotation(&from_fn(|k| Two::new(q_21.map(|q| q.coords[(k + 3) % 4]))));
-    let t = side_by_side(&direction[0], Some(&direction[1]));
+    let r_21 = rotation(q_21);
     let mut tally = Tally::default();
     for m in matches {
-        let rays = Rays::new(&both(m.bearing1()), &both(m.bearing2()), &r_21, &t);
-        tally.add(&rays, Two::splat(m.length1()), Two::splat(m.length2()));
+        let rays = Rays::new(&both(m.bearing1()), &both(m.bearing2()), &r_21, direction);
+        tally.add(&rays, &[m.length1(), m.length2()].map(Two::splat));
     }
-    from_fn(|k| tally.sums(|x| x.to_array()[k]).completed(q_21[k], &direction[k], matches))
+    tally.completed(q_21, direction, matches)
+}
+
+/// The same for two motions and their twisted partners: the two rotations of two essential matrices.
+pub(crate) fn two_pairs_with_depths(
+    q_21: &TwoQuaternions,
+    direction: &TwoVectors,
+    matches: &[Correspondence],
+) -> [[Completed; 2]; 2] {
+    let r_21 = rotation(q_21);
+    let (mut tally, mut twisted) = (Tally::default(), Tally::default());
+    for m in matches {
+        let b = both(m.bearing2());
+        let rays = Rays::new(&both(m.bearing1()), &b, &r_21, direction);
+        let lengths = [m.length1(), m.length2()].map(Two::splat);
+        tally.add(&rays, &lengths);
+        twisted.add(&rays.twisted(&b, direction), &lengths);
+    }
+    let [x, y, z] = *direction;
+    let twin = product(&[Two::ZERO, x, y, z], q_21);
+    [tally.completed(q_21, direction, matches), twisted.completed(&twin, direction, matches)]
 }
 
 /// What is needed of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: two matches, or one match after
@@ -120,77 +144,98 @@ impl Rays {
         let squares = sampson_squares(dot(t, &normal), along[0], along[1]);
         Self { normal, cosine: dot(b, &c), along, squares }
     }
+
+    /// Of `c' = 2 (t · c) t − c`, as after the twisted rotation. The angles to `t` stay, and the constraint but for its sign.
+    #[inline]
+    fn twisted(&self, b: &TwoVectors, t: &TwoVectors) -> Self {
+        let [tb, tc] = self.along;
+        let (twice, moment) = (tc + tc, cross(b, t));
+        let normal = from_fn(|k| twice * moment[k] - self.normal[k]);
+        Self { normal, cosine: twice * tb - self.cosine, ..*self }
+    }
 }
 
 /// What the matches say of the sign and the length of a translation: sums over those on either side.
 #[derive(Clone, Copy, Default)]
-struct Tally<T> {
-    front: T,
-    behind: T,
+struct Tally {
+    front: Two,
+    behind: Two,
     /// Matches whose rays are not parallel.
-    with_depth: T,
+    with_depth: Two,
     /// Matches whose rays are parallel and point the same way.
-    at_infinity: T,
+    at_infinity: Two,
     /// The sum of the depths, each before its division, and that of their absolute values.
-    signed: T,
-    absolute: T,
+    signed: Two,
+    absolute: Two,
     /// The sum of the squared Sampson errors.
-    squares: T,
+    squares: Two,
 }
 
-impl Tally<Two> {
+impl Tally {
     #[inline]
-    fn add(&mut self, rays: &Rays, length1: Two, length2: Two) {
+    fn add(&mut self, rays: &Rays, [length1, length2]: &[Two; 2]) {
         let (cosine, [tb, tc]) = (rays.cosine, rays.along);
-        let square = dot(&rays.normal, &rays.normal);
-        // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
-        let (area1, area2) = (cosine * tb - tc, tb - cosine * tc);
-        let depths = (area1.abs() * length2 + area2.abs() * length1) / (square * length1 * length2);
         let (zero, one) = (Two::ZERO, Two::splat(1.0));
-        let is_apart = square.simd_gt(Two::splat(PARALLEL * PARALLEL));
-        self.with_depth += is_apart & one;
-        self.front += is_apart & area1.simd_gt(zero) & area2.simd_gt(zero) & one;
-        self.behind += is_apart & area1.simd_lt(zero) & area2.simd_lt(zero) & one;
-        self.at_infinity += !is_apart & cosine.simd_gt(zero) & one;
-        self.signed += is_apart & (area1 + area2);
-        self.absolute += is_apart & depths;
+        let mut square = dot(&rays.normal, &rays.normal);
+        // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
+        let (mut area1, mut area2) = (cosine * tb - tc, tb - cosine * tc);
+        let is_parallel = square.simd_le(Two::splat(PARALLEL * PARALLEL));
+        if is_parallel.any() {
+            (area1, area2) = (!is_parallel & area1, !is_parallel & area2);
+            square = is_parallel.select(one, square);
+            self.at_infinity += is_parallel & cosine.simd_gt(zero) & one;
+        }
+        self.with_depth += !is_parallel & one;
+        self.front += area1.simd_gt(zero) & area2.simd_gt(zero) & one;
+        self.behind += area1.simd_lt(zero) & area2.simd_lt(zero) & one;
+        self.signed += area1 + area2;
+        self.absolute += (area1.abs() * *length2 + area2.abs() * *length1) / (square * (*length1 * *length2));
         self.squares += rays.squares;
     }
 
-    /// Of both together, or of one of them.
-    #[inline]
-    fn sums(&self, of: impl Fn(Two) -> f64) -> Tally<f64> {
-        Tally {
-            front: of(self.front),
-            behind: of(self.behind),
-            with_depth: of(self.with_depth),
-            at_infinity: of(self.at_infinity),
-            signed: of(self.signed),
-            absolute: of(self.absolute),
-            squares: of(self.squares),
+    fn map(self, f: impl Fn(Two) -> Two) -> Self {
+        Self {
+            front: f(self.front),
+            behind: f(self.behind),
+            with_depth: f(self.with_depth),
+            at_infinity: f(self.at_infinity),
+            signed: f(self.signed),
+            absolute: f(self.absolute),
+            squares: f(self.squares),
         }
+    }
+
+    #[inline]
+    fn completed(
+        &self,
+        q_21: &TwoQuaternions,
+        direction: &TwoVectors,
+        matches: &[Correspondence],
+    ) -> [Completed; 2] {
+        let is_tie = self.behind.simd_eq(self.front) & self.signed.simd_lt(Two::ZERO);
+        let flip = self.behind.simd_gt(self.front) | is_tie;
+        let length = self.with_depth * 2.0 / self.absolute;
+        let t_21 = scaled(direction, flip.select(-length, length)).map(Two::to_array);
+        let in_front = (self.at_infinity + flip.select(self.behind, self.front)).to_array();
+        let residual = (self.squares / matches.len() as f64).sqrt().to_array();
+        let (q_21, absolute) = (q_21.map(Two::to_array), self.absolute.to_array());
+        from_fn(|k| {
+            let ([w, i, j, l], [x, y, z]) = (q_21.map(|q| q[k]), t_21.map(|t| t[k]));
+            let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, l));
+            if absolute[k] == 0.0 {
+                let pose = RelativePose::new(q_21, Vector3::zeros());
+                return Completed { pose, in_front: whole(in_front[k]), residual: pose.residual(matches) };
+            }
+            let pose = RelativePose::new(q_21, Vector3::new(x, y, z));
+            Completed { pose, in_front: whole(in_front[k]), residual: residual[k] }
+        })
     }
 }
 
-impl Tally<f64> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of matches")]
-    fn completed(
-        &self,
-        q_21: UnitQuaternion<f64>,
-        direction: &Vector3<f64>,
-        matches: &[Correspondence],
-    ) -> Completed {
-        let [front, behind, at_infinity] = [self.front, self.behind, self.at_infinity].map(|x| x as usize);
-        if self.absolute == 0.0 {
-            let pose = RelativePose::new(q_21, Vector3::zeros());
-            return Completed { pose, in_front: at_infinity, residual: pose.residual(matches) };
-        }
-        let flip = behind > front || (behind == front && self.signed < 0.0);
-        let length = 2.0 * self.with_depth / self.absolute;
-        let pose = RelativePose::new(q_21, direction * if flip { -length } else { length });
-        let in_front = at_infinity + if flip { behind } else { front };
-        Completed { pose, in_front, residual: (self.squares / matches.len() as f64).sqrt() }
-    }
+/// A count of matches.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of matches")]
+fn whole(count: f64) -> usize {
+    count as usize
 }
 
 #[cfg(test)]

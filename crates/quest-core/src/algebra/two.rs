@@ -43,6 +43,23 @@ pub(crate) fn times(m: &Matrix3<f64>, v: &TwoVectors) -> TwoVectors {
     from_fn(|i| Two::splat(m[(i, 0)]) * v[0] + Two::splat(m[(i, 1)]) * v[1] + Two::splat(m[(i, 2)]) * v[2])
 }
 
+#[inline]
+pub(crate) fn scaled<const N: usize>(x: &[Two; N], factor: Two) -> [Two; N] {
+    x.map(|x| x * factor)
+}
+
+/// `p ⊗ q`.
+#[inline]
+pub(crate) fn product(p: &TwoQuaternions, q: &TwoQuaternions) -> TwoQuaternions {
+    let ([a, b, c, d], [w, x, y, z]) = (*p, *q);
+    [
+        a * w - (b * x + c * y + d * z),
+        (a * x + b * w) + (c * z - d * y),
+        (a * y + c * w) + (d * x - b * z),
+        (a * z + d * w) + (b * y - c * x),
+    ]
+}
+
 /// The rotation matrices of unit quaternions, row by row.
 #[inline]
 pub(crate) fn rotation(q: &TwoQuaternions) -> [TwoVectors; 3] {

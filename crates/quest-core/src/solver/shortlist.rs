@@ -8,10 +8,10 @@ use super::gram::Gram;
 use super::motion::{COARSE, FINE, Motion, Until};
 use super::two_descents;
 use super::two_motions::TwoMotions;
-use crate::algebra::two::Two;
+use crate::algebra::two::{self, Two, TwoQuaternions, TwoVectors};
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
-use crate::structure::{Completed, two_with_depths, with_depths};
+use crate::structure::{Completed, two_pairs_with_depths, two_with_depths, with_depths};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -244,35 +244,36 @@ impl Shortlist {
 
     /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
     pub(crate) fn write(&self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
-        let wanted = self.iter().filter(|item| kinds == Kinds::All || item.kind == CandidateKind::Exact);
-        let mut waiting: Option<&Item> = None;
-        for item in wanted {
-            if item.is_pair {
-                push_two([item.kind; 2], &item.motion, &item.motion.twisted(), matches, out);
-            } else if let Some(first) = waiting.take() {
-                push_two([first.kind, item.kind], &first.motion, &item.motion, matches, out);
-            } else {
-                waiting = Some(item);
+        for is_pair in [true, false] {
+            let is_wanted = |item: &&Item| kinds == Kinds::All || item.kind == CandidateKind::Exact;
+            let mut items = self.iter().filter(is_wanted).filter(|item| item.is_pair == is_pair);
+            while let Some(first) = items.next() {
+                let second = items.next();
+                let count = 1 + usize::from(second.is_some());
+                let two = [first, second.unwrap_or(first)];
+                let (q_21, direction) = side_by_side(&two.map(|item| item.motion));
+                let mut push = |completed: [Completed; 2]| {
+                    for (item, completed) in two.iter().zip(completed).take(count) {
+                        out.push(candidate(item.kind, &completed));
+                    }
+                };
+                if is_pair {
+                    let [motions, twisted] = two_pairs_with_depths(&q_21, &direction, matches);
+                    push(motions);
+                    push(twisted);
+                } else {
+                    push(two_with_depths(&q_21, &direction, matches));
+                }
             }
-        }
-        if let Some(Item { kind, motion: Motion { q_21, direction }, .. }) = waiting {
-            out.push(candidate(*kind, &with_depths(*q_21, direction, matches)));
         }
         rank(out);
     }
 }
 
-fn push_two(
-    kinds: [CandidateKind; 2],
-    first: &Motion,
-    second: &Motion,
-    matches: &[Correspondence],
-    out: &mut Candidates,
-) {
-    let (q_21, directions) = ([first.q_21, second.q_21], [first.direction, second.direction]);
-    for (kind, completed) in kinds.into_iter().zip(two_with_depths(&q_21, &directions, matches)) {
-        out.push(candidate(kind, &completed));
-    }
+fn side_by_side([first, second]: &[Motion; 2]) -> (TwoQuaternions, TwoVectors) {
+    let (p, q) = (first.q_21.quaternion(), second.q_21.quaternion());
+    let q_21 = [[p.w, q.w], [p.i, q.i], [p.j, q.j], [p.k, q.k]].map(Two::new);
+    (q_21, two::side_by_side(&first.direction, Some(&second.direction)))
 }
 
 fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
@@ -323,11 +324,13 @@ pub(crate) fn rank(out: &mut Candidates) {
     for (k, (key, candidate)) in keys.iter_mut().zip(out.iter()).enumerate() {
         *key = rank_key(candidate) | k as u128;
     }
-    let keys = &mut keys[..out.len()];
-    keys.sort_unstable();
+    let keys = &keys[..out.len()];
     let unordered = out.clone();
-    for (place, key) in out.as_mut_slice().iter_mut().zip(keys) {
-        *place = unordered[*key as usize % KEY_UNIT];
+    let places = out.as_mut_slice();
+    for (key, candidate) in keys.iter().zip(unordered.iter()) {
+        // As many comparisons as there are pairs, but none that a branch waits for.
+        let place: usize = keys.iter().map(|other| usize::from(other < key)).sum();
+        places[place] = *candidate;
     }
 }
 

@@ -10,7 +10,7 @@ use super::essential::decomposed;
 use super::motion::Motion;
 use super::split::{self, Split};
 use crate::Correspondence;
-use crate::algebra::two::{Two, TwoQuaternions, TwoVectors, both, cross, dot, rotation};
+use crate::algebra::two::{Two, TwoQuaternions, TwoVectors, both, cross, dot, product, rotation, scaled};
 use crate::structure::translation_directions;
 
 /// Newton's iteration takes one or two steps; a double root takes them all.
@@ -167,26 +167,9 @@ fn select<const N: usize>(mask: Two, x: &[Two; N], y: &[Two; N]) -> [Two; N] {
 }
 
 #[inline]
-fn scaled<const N: usize>(x: &[Two; N], factor: Two) -> [Two; N] {
-    x.map(|x| x * factor)
-}
-
-#[inline]
 pub(crate) fn normalized<const N: usize>(x: &[Two; N]) -> [Two; N] {
     let square = x.iter().fold(Two::ZERO, |sum, x| sum + *x * *x);
     scaled(x, Two::splat(1.0) / square.sqrt())
-}
-
-/// `p ⊗ q`.
-#[inline]
-fn product(p: &TwoQuaternions, q: &TwoQuaternions) -> TwoQuaternions {
-    let ([a, b, c, d], [w, x, y, z]) = (*p, *q);
-    [
-        a * w - (b * x + c * y + d * z),
-        (a * x + b * w) + (c * z - d * y),
-        (a * y + c * w) + (d * x - b * z),
-        (a * z + d * w) + (b * y - c * x),
-    ]
 }
 
 /// Two unit vectors that complete each `t` to a right-handed frame (Duff et al., JCGT 2017).

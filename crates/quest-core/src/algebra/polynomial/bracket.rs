@@ -1,8 +1,8 @@
-//! Intervals with one root each: found by trisection with the counts of a Sturm chain, narrowed by a safeguarded Newton iteration.
+//! Intervals with one root each: found by trisection with the counts of a Sturm chain, narrowed by a safeguarded Laguerre iteration.
 
+use super::MAX_STEPS;
 use super::real::RealRoots;
 use super::sturm::{Chain, End};
-use super::{MAX_STEPS, value_and_slope};
 use crate::algebra::two::Two;
 
 /// An interval with one root.
@@ -67,7 +67,7 @@ impl<const N: usize> Brackets<N> {
         }
     }
 
-    /// The roots: Newton's iteration, bisection where it would leave the bracket.
+    /// The roots: Laguerre's iteration, bisection where it would leave the bracket.
     ///
     /// A step of each two in turn: the steps of one root wait for each other, those of different roots do not.
     pub(super) fn refined(&self, p: &[f64; N]) -> RealRoots<N> {
@@ -79,7 +79,7 @@ impl<const N: usize> Brackets<N> {
         for _ in 0..MAX_STEPS {
             let mut is_done = true;
             for pair in &mut *pairs {
-                if !pair.is_near.all() {
+                if !pair.is_found.all() {
                     is_done &= pair.step(p);
                 }
             }
@@ -89,7 +89,7 @@ impl<const N: usize> Brackets<N> {
         }
         let mut values = [0.0; N];
         for (values, pair) in values.chunks_mut(2).zip(pairs) {
-            let roots = pair.root(p).to_array();
+            let roots = pair.x.to_array();
             values.copy_from_slice(&roots[..values.len()]);
         }
         RealRoots { values, len: self.len, certain: self.certain, close: false }
@@ -101,12 +101,11 @@ impl<const N: usize> Brackets<N> {
 struct TwoBrackets {
     low: Two,
     high: Two,
-    /// The best estimates, and how far the last steps moved them.
+    /// The best estimates.
     x: Two,
-    moved: Two,
-    /// Masks: whether the polynomial is positive at `low`, and whether the estimate is good to a third of its digits.
+    /// Masks: whether the polynomial is positive at `low`, and whether the estimate is good to all digits.
     positive_below: Two,
-    is_near: Two,
+    is_found: Two,
 }
 
 impl TwoBrackets {
@@ -119,41 +118,64 @@ impl TwoBrackets {
             low,
             high,
             x: (low + high) * 0.5,
-            moved: high - low,
             positive_below: Two::new(sign).simd_gt(Two::ZERO),
-            is_near: Two::ZERO,
+            is_found: Two::ZERO,
         }
     }
 
-    /// A step of each that is not near already. Whether both are then.
+    /// A step of each that is not found already. Whether both are then.
     #[inline]
     fn step<const N: usize>(&mut self, p: &[f64; N]) -> bool {
         let Self { x, .. } = *self;
-        let (value, slope) = value_and_slope(p, x);
+        let (value, laguerre) = laguerre(p, x);
         let is_below = value.simd_lt(Two::ZERO) ^ self.positive_below;
         self.low = is_below.select(x, self.low);
         self.high = is_below.select(self.high, x);
-        let newton = x - value / slope;
-        let inside = newton.simd_gt(self.low) & newton.simd_lt(self.high);
-        let next = inside.select(newton, (self.low + self.high) * 0.5);
-        let moved = (next - x).abs();
-        self.x = self.is_near.select(x, next);
-        self.moved = self.is_near.select(self.moved, moved);
-        // Convergence is quadratic: a step of a third of the digits leaves a third, the last one none.
-        self.is_near |= moved.simd_le((next.abs() + 1e-3) * 1e-5);
-        self.is_near.all()
-    }
-
-    /// The roots, by one more step from near.
-    #[inline]
-    fn root<const N: usize>(&self, p: &[f64; N]) -> Two {
-        let (value, slope) = value_and_slope(p, self.x);
-        let last = self.x - value / slope;
-        (last - self.x).abs().simd_le(self.moved).select(last, self.x)
+        // Convergence is cubic: a step of a third of the digits is the last one. At a root rounding decides on which side it is.
+        let short = (x.abs() + 1e-4) * 1e-5;
+        let inside = laguerre.simd_gt(self.low) & laguerre.simd_lt(self.high);
+        let is_taken = inside | (laguerre - x).abs().simd_le(short);
+        let next = is_taken.select(laguerre, (self.low + self.high) * 0.5);
+        self.x = self.is_found.select(x, next);
+        self.is_found |= (next - x).abs().simd_le(short);
+        self.is_found.all()
     }
 }
 
+/// The value, by the even and the odd powers apart, which do not wait for each other: with `y = x²` `p = e(y) + x o(y)`.
 #[inline]
 fn value<const N: usize>(p: &[f64; N], x: Two) -> Two {
-    value_and_slope(p, x).0
+    let (y, [mut even, mut odd]) = (x * x, [Two::ZERO; 2]);
+    for k in (0..N.div_ceil(2)).rev() {
+        even = even * y + p[2 * k];
+        if 2 * k + 1 < N {
+            odd = odd * y + p[2 * k + 1];
+        }
+    }
+    even + x * odd
+}
+
+/// The value, and where a step of Laguerre's iteration leads: with `n` the degree
+///
+/// ```text
+/// x − n p / (p' ± √((n − 1) ((n − 1) p'² − n p p'')))
+/// p' = o + 2 x (e' + x o')        p'' / 2 = e' + 3 x o' + 4 y (e'' / 2 + x o'' / 2)
+/// ```
+#[inline]
+fn laguerre<const N: usize>(p: &[f64; N], x: Two) -> (Two, Two) {
+    let y = x * x;
+    let [[mut e0, mut e1, mut e2], [mut o0, mut o1, mut o2]] = [[Two::ZERO; 3]; 2];
+    for k in (0..N.div_ceil(2)).rev() {
+        (e2, e1, e0) = (e2 * y + e1, e1 * y + e0, e0 * y + p[2 * k]);
+        if 2 * k + 1 < N {
+            (o2, o1, o0) = (o2 * y + o1, o1 * y + o0, o0 * y + p[2 * k + 1]);
+        }
+    }
+    let value = e0 + x * o0;
+    let slope = o0 + (x + x) * (e1 + x * o1);
+    let half_bend = e1 + x * o1 * 3.0 + y * (e2 + x * o2) * 4.0;
+    let (n, less) = ((N - 1) as f64, (N - 2) as f64);
+    let square = (slope * slope * less - value * half_bend * (2.0 * n)) * less;
+    let root = square.max(Two::ZERO).sqrt().copysign(slope);
+    (value, x - value * n / (slope + root))
 }

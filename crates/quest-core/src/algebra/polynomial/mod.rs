@@ -11,27 +11,8 @@ mod sturm;
 pub(crate) use complex::complex_roots;
 pub(crate) use real::{RealRoots, real_roots};
 
-use super::two::Two;
-
-/// Steps to refine a root; seven are usual.
+/// Steps to refine a root; four are usual.
 const MAX_STEPS: usize = 80;
-
-/// By the even and the odd powers apart, which do not wait for each other: with `y = x²`
-/// `p = e(y) + x o(y)` and `p' = o(y) + 2 x (e'(y) + x o'(y))`.
-#[inline]
-fn value_and_slope<const N: usize>(p: &[f64; N], x: Two) -> (Two, Two) {
-    let y = x * x;
-    let ([mut even, mut odd], [mut even_slope, mut odd_slope]) = ([Two::ZERO; 2], [Two::ZERO; 2]);
-    for k in (0..N.div_ceil(2)).rev() {
-        even_slope = even_slope * y + even;
-        even = even * y + p[2 * k];
-        if 2 * k + 1 < N {
-            odd_slope = odd_slope * y + odd;
-            odd = odd * y + p[2 * k + 1];
-        }
-    }
-    (even + x * odd, odd + (x + x) * (even_slope + x * odd_slope))
-}
 
 #[cfg(test)]
 mod tests {
