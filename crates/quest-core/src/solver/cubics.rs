@@ -86,186 +86,188 @@ pub(crate) const PRODUCT: [[usize; 4]; 10] = {
     table
 };
 
-pub(crate) type Linear = [f64; 4];
-pub(crate) type Quadratic = [f64; 10];
 pub(crate) type Cubic = [f64; 20];
 
+/// Two linear forms in `(x, y, z, w)` side by side, and two quadratic ones.
+pub(crate) type Linears = [Two; 4];
+pub(crate) type Quadratics = [Two; 10];
+
+/// The sums of products of linear forms, by [`QUADRATIC`].
 #[inline]
-pub(crate) fn add_linear_product(out: &mut Quadratic, a: &Linear, b: &Linear) {
+pub(crate) fn quadratics<const N: usize>(terms: [(&Linears, &Linears); N]) -> Quadratics {
+    let mut out = [Two::ZERO; 10];
     for i in 0..4 {
         for j in 0..4 {
-            out[SQUARE[i][j]] += a[i] * b[j];
-        }
-    }
-}
-
-/// The sum of products of linear forms.
-#[inline]
-fn sum_of_products<const N: usize>(terms: [(&Linear, &Linear); N]) -> Quadratic {
-    let mut out = [0.0; 10];
-    for (a, b) in terms {
-        add_linear_product(&mut out, a, b);
-    }
-    out
-}
-
-#[inline]
-fn square(a: &Linear) -> Quadratic {
-    let mut out = [0.0; 10];
-    for i in 0..4 {
-        out[SQUARE[i][i]] = a[i] * a[i];
-        for j in 0..i {
-            out[SQUARE[i][j]] = 2.0 * a[i] * a[j];
+            let (a, b) = terms[0];
+            out[SQUARE[i][j]] += terms[1..].iter().fold(a[i] * b[j], |sum, (a, b)| sum + a[i] * b[j]);
         }
     }
     out
 }
 
-#[inline]
-pub(crate) fn add_product<T: Number>(out: &mut [T; 20], a: &[T; 10], b: &[T; 4]) {
-    for i in 0..10 {
-        for j in 0..4 {
-            let place = &mut out[PRODUCT[i][j]];
-            *place = *place + a[i] * b[j];
+/// Ten cubics over [`CUBIC`], and room to compute them in.
+pub(crate) struct Cubics {
+    pub(crate) rows: [Cubic; 10],
+    /// The quadratic factors of the four variables in two cubics.
+    factors: [Quadratics; 4],
+}
+
+impl Cubics {
+    pub(crate) fn new() -> Self {
+        Self { rows: [[0.0; 20]; 10], factors: [[Two::ZERO; 10]; 4] }
+    }
+
+    /// Pair `pair` of the cubics, two rows, as sums of products of quadratic and linear forms.
+    ///
+    /// Summed variable by variable of the linear forms: the registers do not hold twenty coefficients.
+    pub(crate) fn set<const N: usize>(&mut self, pair: usize, terms: [(&Quadratics, &Linears); N]) {
+        let (a, b) = terms[0];
+        for (v, factor) in self.factors.iter_mut().enumerate() {
+            for i in 0..10 {
+                factor[i] = terms[1..].iter().fold(a[i] * b[v], |sum, (a, b)| sum + a[i] * b[v]);
+            }
+        }
+        let mut sums = [Two::ZERO; 20];
+        for v in 0..4 {
+            for i in 0..10 {
+                sums[PRODUCT[i][v]] += self.factors[v][i];
+            }
+        }
+        let (first, second) = self.rows[2 * pair..][..2].split_at_mut(1);
+        let rows = first[0].as_chunks_mut::<2>().0.iter_mut().zip(second[0].as_chunks_mut::<2>().0);
+        for ((first, second), sums) in rows.zip(sums.as_chunks::<2>().0) {
+            [*first, *second] = Two::transpose(*sums).map(Two::to_array);
         }
     }
 }
 
+/// Lane `I` of `x` beside lane `J` of `y`.
 #[inline]
-pub(crate) fn scaled(a: &Linear, factor: f64) -> Linear {
-    a.map(|x| factor * x)
+pub(crate) fn lanes<const I: usize, const J: usize, const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
+    std::array::from_fn(|k| Two::new([x[k].to_array()[I], y[k].to_array()[J]]))
 }
 
-/// The entries of `t`, `S` and `E` as linear forms in `(x, y, z, w)`.
+/// The first of two on both lanes.
+#[inline]
+pub(crate) fn first<const N: usize>(x: &[Two; N]) -> [Two; N] {
+    lanes::<0, 0, N>(x, x)
+}
+
+/// The second of two on both lanes.
+#[inline]
+pub(crate) fn second<const N: usize>(x: &[Two; N]) -> [Two; N] {
+    lanes::<1, 1, N>(x, x)
+}
+
+#[inline]
+fn swapped<const N: usize>(x: &[Two; N]) -> [Two; N] {
+    lanes::<1, 0, N>(x, x)
+}
+
+#[inline]
+pub(crate) fn negative(x: &Linears) -> Linears {
+    x.map(|x| -x)
+}
+
+/// Entries of `t` and of `Z`, two by two; what has one name stands on both lanes.
 struct Forms {
-    t: [Linear; 3],
-    s: [[Linear; 3]; 3],
-    e: [[Linear; 3]; 3],
+    t_x: Linears,
+    t_yz: Linears,
+    trace: Linears,
+    z_xx: Linears,
+    z_yz: Linears,
+    z_yy_zz: Linears,
+    z_xy_xz: Linears,
 }
 
 impl Forms {
     #[inline]
-    fn new(basis: &[Coordinates; 4], p: f64) -> Self {
-        let form = |row: usize| -> Linear { std::array::from_fn(|m| basis[m][row]) };
-        let [t0, t1, t2, xx, yy, zz, xy, xz, yz]: [Linear; 9] = std::array::from_fn(form);
-        // p S + K.
-        let plus = |s: &Linear, k: &Linear| -> Linear { std::array::from_fn(|m| p * s[m] + k[m]) };
-        let minus = |s: &Linear, k: &Linear| -> Linear { std::array::from_fn(|m| p * s[m] - k[m]) };
-        let e = [
-            [scaled(&xx, p), minus(&xy, &t2), plus(&xz, &t1)],
-            [plus(&xy, &t2), scaled(&yy, p), minus(&yz, &t0)],
-            [minus(&xz, &t1), plus(&yz, &t0), scaled(&zz, p)],
-        ];
-        Self { t: [t0, t1, t2], s: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], e }
+    fn new(basis: &[Coordinates; 4]) -> Self {
+        let form = |i, j| -> Linears { std::array::from_fn(|m| Two::new([basis[m][i], basis[m][j]])) };
+        let trace: Linears = std::array::from_fn(|m| Two::splat(basis[m][3] + basis[m][4] + basis[m][5]));
+        let less = |x: Linears| -> Linears { std::array::from_fn(|m| trace[m] - x[m] * 2.0) };
+        Self {
+            t_x: form(0, 0),
+            t_yz: form(1, 2),
+            trace,
+            z_xx: less(form(3, 3)),
+            z_yz: form(8, 8).map(|x| x * -2.0),
+            z_yy_zz: less(form(4, 5)),
+            z_xy_xz: form(6, 7).map(|x| x * -2.0),
+        }
     }
 
-    /// `S_xx, S_yy, S_zz, S_xy, S_xz, S_yz`.
+    /// `Z t` at `y, z`, and at `x` beside `−|t|²`.
     #[inline]
-    fn upper_s(&self) -> [&Linear; 6] {
-        let [[xx, xy, xz], [_, yy, yz], [.., zz]] = &self.s;
-        [xx, yy, zz, xy, xz, yz]
-    }
-
-    /// `Λ`, by its upper triangle. With `E = K + p S`
-    ///
-    /// ```text
-    /// Λ_xx = 4 (t_y S_xz − t_z S_xy) + p (S_xx² − S_yy² − S_zz² − 2 S_yz²)
-    /// Λ_xy = 2 (S_xx E_yx + S_yy E_xy + S_yz E_xz − t_x S_xz)
-    /// ```
-    ///
-    /// and so in turn.
-    #[inline]
-    fn lambda(&self, p: f64) -> [[Quadratic; 3]; 3] {
-        let [xx, yy, zz, xy, xz, yz] = &self.upper_s().map(|a| scaled(a, 2.0));
-        let [sxx, syy, szz, sxy, sxz, syz] = &self.upper_s().map(square);
-        let (e, [t0, t1, t2]) = (&self.e, &self.t.each_ref().map(|t| scaled(t, 2.0)));
-        let [m0, m1, m2] = &self.t.each_ref().map(|t| scaled(t, -1.0));
-        let turned = [(t0, yz), (t1, xz), (t2, xy)].map(|pair| sum_of_products([pair]));
-        let on = |i: usize, [a, b, c, d]: [&Quadratic; 4]| -> Quadratic {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            std::array::from_fn(|q| turned[j][q] - turned[k][q] + p * (a[q] - b[q] - c[q] - 2.0 * d[q]))
-        };
-        let off_xy = sum_of_products([(xx, &e[1][0]), (yy, &e[0][1]), (yz, &e[0][2]), (xz, m0)]);
-        let off_xz = sum_of_products([(zz, &e[0][2]), (xx, &e[2][0]), (xy, &e[2][1]), (yz, m2)]);
-        let off_yz = sum_of_products([(yy, &e[2][1]), (zz, &e[1][2]), (xz, &e[1][0]), (xy, m1)]);
+    fn turned(&self) -> [Quadratics; 2] {
+        let Self { t_x, t_yz, z_xx, z_yz, z_yy_zz, z_xy_xz, .. } = self;
+        let (minus_x, minus_yz) = (negative(t_x), negative(t_yz));
         [
-            [on(0, [sxx, syy, szz, syz]), off_xy, off_xz],
-            [off_xy, on(1, [syy, szz, sxx, sxz]), off_yz],
-            [off_xz, off_yz, on(2, [szz, sxx, syy, sxy])],
+            quadratics([(z_xy_xz, t_x), (z_yy_zz, t_yz), (z_yz, &swapped(t_yz))]),
+            quadratics([
+                (&lanes::<0, 0, 4>(z_xx, &minus_x), t_x),
+                (&lanes::<0, 0, 4>(z_xy_xz, &minus_yz), &first(t_yz)),
+                (&lanes::<1, 1, 4>(z_xy_xz, &minus_yz), &second(t_yz)),
+            ]),
         ]
     }
 
-    /// `det(tr(S) I − 2 S)`, as products whose sum it is; the last one is zero.
+    /// `A = adj Z` at `xy, xz`, at `yy, zz`, and at `yz, xx`.
     #[inline]
-    fn tenth(&self) -> [(Quadratic, Linear); 4] {
-        let mut d = self.s.each_ref().map(|row| row.each_ref().map(|a| scaled(a, -2.0)));
-        for i in 0..3 {
-            for m in 0..4 {
-                d[i][i][m] += self.s[0][0][m] + self.s[1][1][m] + self.s[2][2][m];
-            }
+    fn adjugate(&self) -> [Quadratics; 3] {
+        let Self { z_xx, z_yz, z_yy_zz, z_xy_xz, .. } = self;
+        let (z_xz_xy, z_zz_yy) = (swapped(z_xy_xz), swapped(z_yy_zz));
+        [
+            quadratics([(&z_xz_xy, z_yz), (&negative(z_xy_xz), &z_zz_yy)]),
+            quadratics([(z_xx, &z_zz_yy), (&negative(&z_xz_xy), &z_xz_xy)]),
+            quadratics([
+                (&lanes::<0, 0, 4>(z_xy_xz, z_yy_zz), &lanes::<1, 1, 4>(z_xy_xz, z_yy_zz)),
+                (&negative(z_yz), &lanes::<0, 0, 4>(z_xx, z_yz)),
+            ]),
+        ]
+    }
+
+    /// `B = t tᵀ + p² / 4 (tr(A) I − A)`, in the places of `A`.
+    #[inline]
+    fn beside_trace(&self, [a_xy_xz, a_yy_zz, a_yz_xx]: &[Quadratics; 3], p: f64) -> [Quadratics; 3] {
+        let Self { t_x, t_yz, .. } = self;
+        let (t_yx, t_zx) = (lanes::<0, 0, 4>(t_yz, t_x), lanes::<1, 0, 4>(t_yz, t_x));
+        let quarter = 0.25 * p * p;
+        let mut b = [quadratics([(t_x, t_yz)]), quadratics([(t_yz, t_yz)]), quadratics([(&t_yx, &t_zx)])];
+        for k in 0..10 {
+            let ([a_yy, a_zz], [a_yz, a_xx]) = (a_yy_zz[k].to_array(), a_yz_xx[k].to_array());
+            b[0][k] -= a_xy_xz[k] * quarter;
+            b[1][k] += Two::new([a_xx + a_zz, a_xx + a_yy]) * quarter;
+            b[2][k] += Two::new([-a_yz, a_yy + a_zz]) * quarter;
         }
-        let product = |j: usize| {
-            let (a, b) = ((j + 1) % 3, (j + 2) % 3);
-            (sum_of_products([(&d[1][a], &d[2][b]), (&scaled(&d[1][b], -1.0), &d[2][a])]), d[0][j])
-        };
-        [product(0), product(1), product(2), ([0.0; 10], [0.0; 4])]
+        b
     }
 }
 
-/// The ten divided cubics over [`CUBIC`].
+/// The ten divided cubics over [`CUBIC`]: the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
 pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
-    let forms = Forms::new(basis, p);
-    let Forms { t, s, e, .. } = &forms;
-    let lambda = forms.lambda(p);
-    // −2 tᵀ S.
-    let [m0, m1, m2] = &t.each_ref().map(|t| scaled(t, -2.0));
-    let row = s.each_ref().map(|[s0, s1, s2]| sum_of_products([(m0, s0), (m1, s1), (m2, s2)]));
-    let rows = upper_rows(&lambda);
-    matrix_of_cubics(
-        |i, j| [(&row[j], &t[i]), (rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
-        &forms.tenth(),
-    )
-}
-
-/// The rows of a symmetric matrix that is given by its upper triangle.
-#[inline]
-pub(crate) fn upper_rows(m: &[[Quadratic; 3]; 3]) -> [[&Quadratic; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| &m[i.min(j)][i.max(j)]))
-}
-
-/// Entries of a 3 × 3 matrix that are computed side by side; beside the last one stands the tenth cubic.
-const SIDE_BY_SIDE: [[(usize, usize); 2]; 4] =
-    [[(0, 0), (0, 1)], [(1, 0), (1, 1)], [(2, 0), (2, 1)], [(0, 2), (1, 2)]];
-
-/// The cubics of a 3 × 3 matrix row by row and a tenth behind them, each a sum of products.
-#[inline]
-pub(crate) fn matrix_of_cubics<'a, const N: usize>(
-    terms: impl Fn(usize, usize) -> [(&'a Quadratic, &'a Linear); N],
-    tenth: &'a [(Quadratic, Linear); N],
-) -> [Cubic; 10] {
-    let mut out = [[0.0; 20]; 10];
-    for [(i, j), (k, l)] in SIDE_BY_SIDE {
-        let mut two = [Two::ZERO; 20];
-        for ((a, b), (c, d)) in terms(i, j).into_iter().zip(terms(k, l)) {
-            add_product(&mut two, &interleaved(a, c), &interleaved(b, d));
-        }
-        for (n, two) in two.into_iter().enumerate() {
-            [out[3 * i + j][n], out[3 * k + l][n]] = two.to_array();
-        }
-    }
-    let mut two = [Two::ZERO; 20];
-    for ((a, b), (c, d)) in terms(2, 2).into_iter().zip(tenth) {
-        add_product(&mut two, &interleaved(a, c), &interleaved(b, d));
-    }
-    for (n, two) in two.into_iter().enumerate() {
-        [out[8][n], out[9][n]] = two.to_array();
-    }
-    out
-}
-
-#[inline]
-fn interleaved<const N: usize>(x: &[f64; N], y: &[f64; N]) -> [Two; N] {
-    std::array::from_fn(|k| Two::new([x[k], y[k]]))
+    let forms = Forms::new(basis);
+    let Forms { t_x, t_yz, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
+    let [zt_yz, zt_x_square] = &forms.turned();
+    let adjugate = &forms.adjugate();
+    let [b_xy_xz, b_yy_zz, b_yz_xx] = &forms.beside_trace(adjugate, p);
+    let (zt_x, minus_square, minus_trace) = (&first(zt_x_square), &second(zt_x_square), &negative(trace));
+    let mut out = Cubics::new();
+    // (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − tr(Z) B.
+    out.set(0, [(zt_x, t_yz), (zt_yz, t_x), (minus_square, z_xy_xz), (b_xy_xz, minus_trace)]);
+    out.set(1, [(zt_yz, &t_yz.map(|t| t + t)), (minus_square, z_yy_zz), (b_yy_zz, minus_trace)]);
+    let (zt_yx, zt_zx) = (lanes::<0, 0, 10>(zt_yz, zt_x), lanes::<1, 0, 10>(zt_yz, zt_x));
+    let (t_yx, t_zx, z_yz_xx) =
+        (lanes::<0, 0, 4>(t_yz, t_x), lanes::<1, 0, 4>(t_yz, t_x), lanes::<0, 0, 4>(z_yz, z_xx));
+    out.set(2, [(&zt_yx, &t_zx), (&zt_zx, &t_yx), (minus_square, &z_yz_xx), (b_yz_xx, minus_trace)]);
+    // A t, and det Z by the first row.
+    let [a_xy_xz, a_yy_zz, a_yz_xx] = adjugate;
+    out.set(3, [(a_xy_xz, t_x), (a_yy_zz, t_yz), (&first(a_yz_xx), &swapped(t_yz))]);
+    let by_first_row =
+        [lanes::<0, 0, 4>(t_x, z_xx), lanes::<0, 0, 4>(t_yz, z_xy_xz), lanes::<1, 1, 4>(t_yz, z_xy_xz)];
+    let [x, y, z] = &by_first_row;
+    out.set(4, [(&second(a_yz_xx), x), (&first(a_xy_xz), y), (&second(a_xy_xz), z)]);
+    out.rows
 }
 
 /// `x N1 + y N2 + z N3 + w N4`.
@@ -293,15 +295,15 @@ mod tests {
         let s = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let e = t.cross_matrix() + s * p;
         let eet = e * e.transpose();
-        let expected = (eet * 2.0 - Matrix3::from_diagonal_element(eet.trace())) * e / p;
-        let cubics = ten_cubics(&basis, p);
-        let value = |c: &Cubic| evaluate(&CUBIC, c, v);
-        for i in 0..3 {
-            for j in 0..3 {
-                assert!((value(&cubics[3 * i + j]) - expected[(i, j)]).abs() < 1e-13);
-            }
-        }
-        let trace: f64 = (0..3).map(|i| value(&cubics[4 * i])).sum();
-        assert!((trace + 2.0 * e.determinant() / p + p * p * value(&cubics[9])).abs() < 1e-13);
+        let c = (eet * 2.0 - Matrix3::from_diagonal_element(eet.trace())) * e / p;
+        let [six_xy, six_xz, six_yy, six_zz, six_yz, six_xx, at_y, at_z, at_x, det] =
+            ten_cubics(&basis, p).map(|cubic| evaluate(&CUBIC, &cubic, v));
+        let six = Matrix3::new(six_xx, six_xy, six_xz, six_xy, six_yy, six_yz, six_xz, six_yz, six_zz);
+        let antisymmetric = nalgebra::Vector3::new(at_x, at_y, at_z).cross_matrix() * -p;
+        // C / 2 = six + (tᵀ S t + p² (h tr A − det Z) / 8) I, and tr(six) = −4 tᵀ S t − p² h tr A / 2.
+        let multiple = -six.trace() / 4.0 - p * p * det / 8.0;
+        let symmetric = (six + Matrix3::from_diagonal_element(multiple)) * 2.0;
+        assert!((symmetric + antisymmetric - c).amax() < 1e-13);
+        assert!((c.trace() + 2.0 * e.determinant() / p + p * p * det).abs() < 1e-13);
     }
 }

@@ -66,12 +66,13 @@ fn from_five(
         shortlist.retain(CandidateKind::Exact);
         let roots = Roots::new(&basis, alignment);
         let complete = roots.real(|two, count| shortlist.push_solutions(two, count, alignment, matches));
-        if kinds == Kinds::All {
+        // Where the roots are in doubt, two real ones may have become complex.
+        if kinds == Kinds::All || !complete {
             roots.complex(|q_21, nearly_real| {
                 let two = TwoMotions::of_rotations(q_21, matches);
                 if nearly_real {
                     shortlist.push_solutions(&two, 2, alignment, matches);
-                } else {
+                } else if kinds == Kinds::All {
                     for motion in two.apart().into_iter().flatten() {
                         shortlist.push(CandidateKind::FromComplex, motion);
                     }
@@ -123,8 +124,13 @@ pub(crate) fn motions_of_five(matches: &[Correspondence; 5]) -> Option<Shortlist
     from_five(Kinds::Exact, &alignment, matches, &mut shortlist).ok().map(|()| shortlist)
 }
 
-/// A double root is known to the square root of rounding; times what the elimination loses.
+/// A double root is known to the square root of rounding; times what the elimination loses. With little parallax rounding is that
+/// of the direction of the translation.
 const NEARLY_REAL: f64 = 1e-4;
+
+/// With less parallax than this the rounding of the bearings leaves the direction of the translation open to 1e-7, and decides
+/// more often what is real.
+const SMALL_PARALLAX: f64 = 1e-6;
 
 /// An elimination that comes this close to singular has lost five digits; clusters of roots lose the others. One noisy problem in
 /// five hundred is.
@@ -155,7 +161,7 @@ impl<'a> Roots<'a> {
         let (resultant, pivot) = Resultant::new(&mut ten_cubics(basis, alignment.parallax));
         let polynomial = resultant.polynomial();
         let mut real = real_roots(&polynomial);
-        real.certain &= pivot > SMALL_PIVOT && !real.close;
+        real.certain &= pivot > SMALL_PIVOT && !real.close && alignment.parallax > SMALL_PARALLAX;
         Self { basis, alignment, resultant, polynomial, real }
     }
 
@@ -175,6 +181,7 @@ impl<'a> Roots<'a> {
     /// Hands over the real parts of both rotations of each complex pair of roots, and whether the pair may be two real
     /// ones that rounding has joined.
     fn complex(&self, mut accept: impl FnMut(&TwoQuaternions, bool)) {
+        let nearly_real = NEARLY_REAL.max((10.0 * self.alignment.direction_resolution()).sqrt());
         let mut roots = [Complex::from(0.0); 11];
         let count = complex_roots(&self.polynomial, self.real.as_slice(), &mut roots);
         for roots in roots[..count].chunks(2) {
@@ -185,7 +192,7 @@ impl<'a> Roots<'a> {
             for (k, z) in roots.iter().enumerate() {
                 let q = std::array::from_fn(|i| Two::new([twins[0][i][k], twins[1][i][k]]));
                 let q_21 = after(&normalized(&q), &self.alignment.q0_21);
-                accept(&q_21, z.im < NEARLY_REAL * (1.0 + z.re.abs()));
+                accept(&q_21, z.im < nearly_real * (1.0 + z.re.abs()));
             }
         }
     }

@@ -10,54 +10,50 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::cubics::{Cubic, Linear, Quadratic, add_linear_product, matrix_of_cubics, scaled, upper_rows};
+use super::cubics::{Cubic, Cubics, Linears, first, lanes, negative, quadratics, second};
+use crate::algebra::two::Two;
 
 /// Four essential matrices, row by row.
 pub(crate) type Basis = [[f64; 9]; 4];
 
-/// The ten cubics over [`CUBIC`](super::cubics::CUBIC): the trace constraint row by row, then the determinant.
+/// The ten cubics over [`CUBIC`](super::cubics::CUBIC): the trace constraint row by row, of each row the first two columns, then
+/// the last column, then the determinant.
 pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
-    let e: [[Linear; 3]; 3] =
-        std::array::from_fn(|i| std::array::from_fn(|j| std::array::from_fn(|m| basis[m][3 * i + j])));
-    let product = half_traceless_square(&e);
-    let rows = upper_rows(&product);
-    matrix_of_cubics(
-        |i, j| [(rows[i][0], &e[0][j]), (rows[i][1], &e[1][j]), (rows[i][2], &e[2][j])],
-        &determinant(&e),
-    )
-}
-
-/// `E Eᵀ − ½ tr(E Eᵀ) I`, by its upper triangle.
-#[inline]
-fn half_traceless_square(e: &[[Linear; 3]; 3]) -> [[Quadratic; 3]; 3] {
-    let mut product = [[[0.0; 10]; 3]; 3];
-    for i in 0..3 {
-        for j in i..3 {
-            for m in 0..3 {
-                add_linear_product(&mut product[i][j], &e[i][m], &e[j][m]);
-            }
-        }
+    // Two entries of E, by their places in its rows.
+    let e = |i: usize, j: usize| -> Linears { std::array::from_fn(|m| Two::new([basis[m][i], basis[m][j]])) };
+    let product = |[a, b]: [usize; 2], [c, d]: [usize; 2]| {
+        let [x, y] = [[0, 1, 2].map(|k| e(3 * a + k, 3 * b + k)), [0, 1, 2].map(|k| e(3 * c + k, 3 * d + k))];
+        quadratics([(&x[0], &y[0]), (&x[1], &y[1]), (&x[2], &y[2])])
+    };
+    // E Eᵀ − ½ tr(E Eᵀ) I.
+    let (mut p00_01, mut p11_22) = (product([0, 0], [0, 1]), product([1, 2], [1, 2]));
+    let p02_12 = product([0, 1], [2, 2]);
+    for k in 0..10 {
+        let ([p00, p01], [p11, p22]) = (p00_01[k].to_array(), p11_22[k].to_array());
+        let half = 0.5 * (p00 + p11 + p22);
+        p00_01[k] = Two::new([p00 - half, p01]);
+        p11_22[k] -= Two::splat(half);
     }
-    let half: Quadratic =
-        std::array::from_fn(|q| 0.5 * (product[0][0][q] + product[1][1][q] + product[2][2][q]));
-    for i in 0..3 {
-        for q in 0..10 {
-            product[i][i][q] -= half[q];
-        }
-    }
-    product
-}
-
-/// `det E`, as products whose sum it is.
-#[inline]
-fn determinant(e: &[[Linear; 3]; 3]) -> [(Quadratic, Linear); 3] {
-    std::array::from_fn(|j| {
-        let (a, b) = ((j + 1) % 3, (j + 2) % 3);
-        let mut minor = [0.0; 10];
-        add_linear_product(&mut minor, &e[1][a], &e[2][b]);
-        add_linear_product(&mut minor, &scaled(&e[1][b], -1.0), &e[2][a]);
-        (minor, e[0][j])
-    })
+    let (p00, p01, p02) = (first(&p00_01), second(&p00_01), first(&p02_12));
+    let (p11, p12, p22) = (first(&p11_22), second(&p02_12), second(&p11_22));
+    // The cofactors of the first row.
+    let m0_1 = quadratics([(&e(4, 5), &e(8, 6)), (&negative(&e(5, 3)), &e(7, 8))]);
+    let m2 = quadratics([(&e(3, 3), &e(7, 7)), (&negative(&e(4, 4)), &e(6, 6))]);
+    let [e0, e1, e2] = [e(0, 1), e(3, 4), e(6, 7)];
+    let mut out = Cubics::new();
+    out.set(0, [(&p00, &e0), (&p01, &e1), (&p02, &e2)]);
+    out.set(1, [(&p01, &e0), (&p11, &e1), (&p12, &e2)]);
+    out.set(2, [(&p02, &e0), (&p12, &e1), (&p22, &e2)]);
+    out.set(3, [(&p00_01, &e(2, 2)), (&lanes::<1, 0, 10>(&p00_01, &p11_22), &e(5, 5)), (&p02_12, &e(8, 8))]);
+    out.set(
+        4,
+        [
+            (&lanes::<0, 0, 10>(&p02, &m0_1), &e(2, 0)),
+            (&lanes::<0, 1, 10>(&p12, &m0_1), &e(5, 1)),
+            (&lanes::<0, 0, 10>(&p22, &m2), &e(8, 2)),
+        ],
+    );
+    out.rows
 }
 
 #[cfg(test)]
@@ -77,8 +73,8 @@ mod tests {
         let expected = (eet - Matrix3::from_diagonal_element(0.5 * eet.trace())) * e;
         let cubics = trace_cubics(&basis);
         for i in 0..3 {
-            for j in 0..3 {
-                assert!((evaluate(&CUBIC, &cubics[3 * i + j], v) - expected[(i, j)]).abs() < 1e-13);
+            for (j, place) in [2 * i, 2 * i + 1, 6 + i].into_iter().enumerate() {
+                assert!((evaluate(&CUBIC, &cubics[place], v) - expected[(i, j)]).abs() < 1e-13);
             }
         }
         assert!((evaluate(&CUBIC, &cubics[9], v) - e.determinant()).abs() < 1e-13);

@@ -4,8 +4,8 @@
 use crate::algebra::two::Two;
 
 /// A square of a gap, relative to the roots, at which rounding in the coefficients begins to decide what is real; one noisy
-/// five-point problem in two hundred has it.
-const NEARLY_DOUBLE: f64 = 1e-6;
+/// five-point problem in a hundred has it.
+const NEARLY_DOUBLE: f64 = 4e-6;
 
 /// How much a chain may magnify an error of its first members, by a bound that is far too wide: for half of the noisy five-point
 /// problems it says 1e9, for one in two hundred more than this. The only one of 40,000 whose roots were miscounted had 6e20.
