@@ -5,84 +5,121 @@ use super::two::Two;
 /// An orthonormal basis of the vectors orthogonal to the `R` rows of `a`, and the smallest pivot over the largest: how
 /// far the rows are from dependent.
 ///
-/// Rows that depend on those before leave nothing to reflect. `C = R + K`; `a` is overwritten.
+/// Rows that depend on those before leave nothing to reflect. `C = R + K`.
 pub(crate) fn null_space<const R: usize, const C: usize, const K: usize>(
-    a: &mut [[f64; C]; R],
+    a: &[[f64; C]; R],
 ) -> ([[f64; C]; K], f64) {
     const { assert!(R + K == C) }
+    // Row k becomes the reflection's vector v, with I − v vᵀ · inverse, zero ahead of entry k: loops of fixed length are worth more
+    // than the products with these zeros.
+    let mut v = a.map(|row| Blocks::new(&row));
     let mut inverse = [0.0; R];
     let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
     for k in 0..R {
-        // The row becomes the reflection's vector v, with I − v vᵀ · inverse, zero ahead of entry k: loops of fixed length
-        // are worth more than the products with these zeros. No entry is written alone: what reads two would wait for it.
-        let (head, tail) = a.split_at_mut(k + 1);
-        let v = &mut head[k];
-        for j in 0..C {
-            v[j] *= Entries::<R, C>::FROM[k][j];
+        let (head, tail) = v.split_at_mut(k + 1);
+        let row = &mut head[k];
+        // The products with the row itself, which wait for no square root, give those with v.
+        let (square, pivot) = (row.dot(row), row.entry(k));
+        let length = square.sqrt();
+        let image = -length.copysign(pivot);
+        inverse[k] = if length > 0.0 { 1.0 / (square - image * pivot) } else { 0.0 };
+        for other in tail {
+            let factor = (row.dot(other) - image * other.entry(k)) * inverse[k];
+            other.subtract_from(k + 1, factor, row);
         }
-        let length = dot(v, v).sqrt();
+        row.subtract_unit(k, image);
         smallest = smallest.min(length);
         largest = largest.max(length);
-        let image = -length.copysign(v[k]);
-        inverse[k] = if length > 0.0 { 1.0 / (length * length - image * v[k]) } else { 0.0 };
-        for j in 0..C {
-            v[j] -= image * Entries::<R, C>::ONLY[k][j];
-        }
-        for row in tail {
-            reflect(row, v, inverse[k]);
-        }
     }
-    let mut basis = [[0.0; C]; K];
-    for (m, e) in basis.iter_mut().enumerate() {
-        e[R + m] = 1.0;
-        for k in (0..R).rev() {
-            reflect(e, &a[k], inverse[k]);
+    // The product of the reflections is I − Σ v_k w_kᵀ, with w_k = inverse_k (v_k − Σ (v_k · v_l) w_l) over l > k: only of v · v
+    // one waits for another.
+    let mut w = [[0.0; K]; R];
+    for k in (0..R).rev() {
+        let mut sum: [f64; K] = std::array::from_fn(|m| v[k].entry(R + m));
+        for l in k + 1..R {
+            let product = v[k].dot(&v[l]);
+            for m in 0..K {
+                sum[m] -= product * w[l][m];
+            }
         }
+        w[k] = sum.map(|x| x * inverse[k]);
     }
+    let basis = std::array::from_fn(|m| {
+        let mut e = Blocks::new(&[0.0; C]);
+        e.subtract_unit(R + m, -1.0);
+        for k in 0..R {
+            e.subtract_from(0, w[k][m], &v[k]);
+        }
+        e.to_array()
+    });
     (basis, if largest > 0.0 { smallest / largest } else { 0.0 })
 }
 
-/// Ones for the entries from `k` on, and for entry `k` alone.
-struct Entries<const R: usize, const C: usize>;
+/// A row two entries a block, the first half of the blocks in use.
+#[derive(Clone, Copy)]
+struct Blocks<const C: usize>([Two; C]);
 
-impl<const R: usize, const C: usize> Entries<R, C> {
-    const FROM: [[f64; C]; R] = Self::ones().0;
-    const ONLY: [[f64; C]; R] = Self::ones().1;
+impl<const C: usize> Blocks<C> {
+    const COUNT: usize = C.div_ceil(2);
+    /// The bits of the entries from each one on, and the unit vectors.
+    const FROM: [[[f64; 2]; C]; C] = Self::masks().0;
+    const UNIT: [[[f64; 2]; C]; C] = Self::masks().1;
 
-    const fn ones() -> ([[f64; C]; R], [[f64; C]; R]) {
-        let (mut from, mut only) = ([[0.0; C]; R], [[0.0; C]; R]);
+    const fn masks() -> ([[[f64; 2]; C]; C], [[[f64; 2]; C]; C]) {
+        let (mut from, mut unit) = ([[[0.0; 2]; C]; C], [[[0.0; 2]; C]; C]);
         let mut k = 0;
-        while k < R {
-            only[k][k] = 1.0;
+        while k < C {
+            unit[k][k / 2][k % 2] = 1.0;
             let mut j = k;
             while j < C {
-                from[k][j] = 1.0;
+                from[k][j / 2][j % 2] = f64::from_bits(u64::MAX);
                 j += 1;
             }
             k += 1;
         }
-        (from, only)
+        (from, unit)
     }
-}
 
-/// Applies `I − v vᵀ · inverse`.
-#[inline]
-fn reflect<const C: usize>(x: &mut [f64; C], v: &[f64; C], inverse: f64) {
-    let dot = dot(x, v) * inverse;
-    for j in 0..C {
-        x[j] -= dot * v[j];
+    #[inline]
+    fn new(row: &[f64; C]) -> Self {
+        let entry = |j: usize| if j < C { row[j] } else { 0.0 };
+        Self(std::array::from_fn(|b| Two::new([entry(2 * b), entry(2 * b + 1)])))
     }
-}
 
-#[inline]
-fn dot<const C: usize>(x: &[f64; C], y: &[f64; C]) -> f64 {
-    let ((xs, x_rest), (ys, y_rest)) = (x.as_chunks::<2>(), y.as_chunks::<2>());
-    // Two sums of two, so that the additions need not wait for each other.
-    let mut sums = [Two::ZERO; 2];
-    for (k, (x, y)) in xs.iter().zip(ys).enumerate() {
-        sums[k % 2] += Two::new(*x) * Two::new(*y);
+    #[inline]
+    fn entry(&self, k: usize) -> f64 {
+        self.0[k / 2].to_array()[k % 2]
     }
-    x_rest.iter().zip(y_rest).map(|(x, y)| x * y).sum::<f64>() + (sums[0] + sums[1]).reduce_add()
+
+    #[inline]
+    fn to_array(self) -> [f64; C] {
+        std::array::from_fn(|k| self.entry(k))
+    }
+
+    #[inline]
+    fn dot(&self, other: &Self) -> f64 {
+        // Two sums of two, so that the additions need not wait for each other.
+        let mut sums = [Two::ZERO; 2];
+        for b in 0..Self::COUNT {
+            sums[b % 2] += self.0[b] * other.0[b];
+        }
+        (sums[0] + sums[1]).reduce_add()
+    }
+
+    /// Less a multiple of another row; what stands ahead of entry `k` becomes zero.
+    #[inline]
+    fn subtract_from(&mut self, k: usize, factor: f64, other: &Self) {
+        for b in 0..Self::COUNT {
+            self.0[b] = (self.0[b] - other.0[b] * factor) & Two::new(Self::FROM[k][b]);
+        }
+    }
+
+    #[inline]
+    fn subtract_unit(&mut self, k: usize, factor: f64) {
+        for b in 0..Self::COUNT {
+            self.0[b] -= Two::new(Self::UNIT[k][b]) * factor;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -94,10 +131,11 @@ mod tests {
     #[test]
     fn basis_is_orthonormal_and_orthogonal_to_the_rows() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let dot = |x: &[f64; 9], y: &[f64; 9]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
         for _ in 0..100 {
             let a: [[f64; 9]; 5] =
                 std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-            let (basis, pivot) = null_space::<5, 9, 4>(&mut a.clone());
+            let (basis, pivot) = null_space::<5, 9, 4>(&a);
             assert!(pivot > 1e-3);
             for (i, x) in basis.iter().enumerate() {
                 assert!(a.iter().all(|row| dot(row, x).abs() < 1e-14));
@@ -115,7 +153,7 @@ mod tests {
             row[k] += 1.0;
         }
         a[4] = std::array::from_fn(|j| a[0][j] + a[1][j] - 2.0 * a[2][j]);
-        assert!(null_space::<5, 9, 4>(&mut a).1 < 1e-15);
-        assert!(null_space::<5, 9, 4>(&mut [[0.0; 9]; 5]).1 <= 0.0);
+        assert!(null_space::<5, 9, 4>(&a).1 < 1e-15);
+        assert!(null_space::<5, 9, 4>(&[[0.0; 9]; 5]).1 <= 0.0);
     }
 }

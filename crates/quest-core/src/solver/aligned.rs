@@ -134,8 +134,8 @@ impl Alignment {
     /// The null space of the rows of five matches, or why they are dependent.
     pub(crate) fn null_space(&self, matches: &[Correspondence; 5]) -> Result<[Coordinates; 4], Degeneracy> {
         let turned = self.turned();
-        let mut rows = matches.each_ref().map(|m| self.row(m.bearing2(), &turned(m)));
-        let (basis, pivot) = null_space(&mut rows);
+        let rows = matches.each_ref().map(|m| self.row(m.bearing2(), &turned(m)));
+        let (basis, pivot) = null_space(&rows);
         if pivot < DEPENDENT { Err(diagnose(matches)) } else { Ok(basis) }
     }
 

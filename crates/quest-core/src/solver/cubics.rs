@@ -93,13 +93,19 @@ pub(crate) type Linears = [Two; 4];
 pub(crate) type Quadratics = [Two; 10];
 
 /// The sums of products of linear forms, by [`QUADRATIC`].
-#[inline]
+///
+/// Not in line: a few forms fit into the registers, all of those that are needed do not.
+#[inline(never)]
 pub(crate) fn quadratics<const N: usize>(terms: [(&Linears, &Linears); N]) -> Quadratics {
+    let product = |i: usize, j: usize| {
+        let (a, b) = terms[0];
+        terms[1..].iter().fold(a[i] * b[j], |sum, (a, b)| sum + a[i] * b[j])
+    };
     let mut out = [Two::ZERO; 10];
     for i in 0..4 {
-        for j in 0..4 {
-            let (a, b) = terms[0];
-            out[SQUARE[i][j]] += terms[1..].iter().fold(a[i] * b[j], |sum, (a, b)| sum + a[i] * b[j]);
+        out[SQUARE[i][i]] = product(i, i);
+        for j in 0..i {
+            out[SQUARE[i][j]] = product(i, j) + product(j, i);
         }
     }
     out
@@ -141,27 +147,35 @@ impl Cubics {
     }
 }
 
-/// Lane `I` of `x` beside lane `J` of `y`.
+/// The first lane of `x` beside the first of `y`.
+///
+/// By the compiler's shuffles: what is put together from numbers goes through memory, and waits there.
 #[inline]
-pub(crate) fn lanes<const I: usize, const J: usize, const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
-    std::array::from_fn(|k| Two::new([x[k].to_array()[I], y[k].to_array()[J]]))
+pub(crate) fn firsts<const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
+    std::array::from_fn(|k| Two::transpose([x[k], y[k]])[0])
+}
+
+/// The second lane of `x` beside the second of `y`.
+#[inline]
+pub(crate) fn seconds<const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
+    std::array::from_fn(|k| Two::transpose([x[k], y[k]])[1])
 }
 
 /// The first of two on both lanes.
 #[inline]
 pub(crate) fn first<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    lanes::<0, 0, N>(x, x)
+    firsts(x, x)
 }
 
 /// The second of two on both lanes.
 #[inline]
 pub(crate) fn second<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    lanes::<1, 1, N>(x, x)
+    seconds(x, x)
 }
 
 #[inline]
 fn swapped<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    lanes::<1, 0, N>(x, x)
+    firsts(&second(x), x)
 }
 
 #[inline]
@@ -205,9 +219,9 @@ impl Forms {
         [
             quadratics([(z_xy_xz, t_x), (z_yy_zz, t_yz), (z_yz, &swapped(t_yz))]),
             quadratics([
-                (&lanes::<0, 0, 4>(z_xx, &minus_x), t_x),
-                (&lanes::<0, 0, 4>(z_xy_xz, &minus_yz), &first(t_yz)),
-                (&lanes::<1, 1, 4>(z_xy_xz, &minus_yz), &second(t_yz)),
+                (&firsts(z_xx, &minus_x), t_x),
+                (&firsts(z_xy_xz, &minus_yz), &first(t_yz)),
+                (&seconds(z_xy_xz, &minus_yz), &second(t_yz)),
             ]),
         ]
     }
@@ -221,8 +235,8 @@ impl Forms {
             quadratics([(&z_xz_xy, z_yz), (&negative(z_xy_xz), &z_zz_yy)]),
             quadratics([(z_xx, &z_zz_yy), (&negative(&z_xz_xy), &z_xz_xy)]),
             quadratics([
-                (&lanes::<0, 0, 4>(z_xy_xz, z_yy_zz), &lanes::<1, 1, 4>(z_xy_xz, z_yy_zz)),
-                (&negative(z_yz), &lanes::<0, 0, 4>(z_xx, z_yz)),
+                (&firsts(z_xy_xz, z_yy_zz), &seconds(z_xy_xz, z_yy_zz)),
+                (&negative(z_yz), &firsts(z_xx, z_yz)),
             ]),
         ]
     }
@@ -231,21 +245,22 @@ impl Forms {
     #[inline]
     fn beside_trace(&self, [a_xy_xz, a_yy_zz, a_yz_xx]: &[Quadratics; 3], p: f64) -> [Quadratics; 3] {
         let Self { t_x, t_yz, .. } = self;
-        let (t_yx, t_zx) = (lanes::<0, 0, 4>(t_yz, t_x), lanes::<1, 0, 4>(t_yz, t_x));
+        let (t_yx, t_zx) = (firsts(t_yz, t_x), firsts(&second(t_yz), t_x));
         let quarter = 0.25 * p * p;
         let mut b = [quadratics([(t_x, t_yz)]), quadratics([(t_yz, t_yz)]), quadratics([(&t_yx, &t_zx)])];
+        let (a_zz_yy, a_xx) = (swapped(a_yy_zz), second(a_yz_xx));
         for k in 0..10 {
-            let ([a_yy, a_zz], [a_yz, a_xx]) = (a_yy_zz[k].to_array(), a_yz_xx[k].to_array());
+            let [minus_yz_and_rest, _] = Two::transpose([-a_yz_xx[k], a_yy_zz[k] + a_zz_yy[k]]);
             b[0][k] -= a_xy_xz[k] * quarter;
-            b[1][k] += Two::new([a_xx + a_zz, a_xx + a_yy]) * quarter;
-            b[2][k] += Two::new([-a_yz, a_yy + a_zz]) * quarter;
+            b[1][k] += (a_xx[k] + a_zz_yy[k]) * quarter;
+            b[2][k] += minus_yz_and_rest * quarter;
         }
         b
     }
 }
 
 /// The ten divided cubics over [`CUBIC`]: the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
-pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
+pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> Cubics {
     let forms = Forms::new(basis);
     let Forms { t_x, t_yz, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
     let [zt_yz, zt_x_square] = &forms.turned();
@@ -256,18 +271,16 @@ pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     // (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − tr(Z) B.
     out.set(0, [(zt_x, t_yz), (zt_yz, t_x), (minus_square, z_xy_xz), (b_xy_xz, minus_trace)]);
     out.set(1, [(zt_yz, &t_yz.map(|t| t + t)), (minus_square, z_yy_zz), (b_yy_zz, minus_trace)]);
-    let (zt_yx, zt_zx) = (lanes::<0, 0, 10>(zt_yz, zt_x), lanes::<1, 0, 10>(zt_yz, zt_x));
-    let (t_yx, t_zx, z_yz_xx) =
-        (lanes::<0, 0, 4>(t_yz, t_x), lanes::<1, 0, 4>(t_yz, t_x), lanes::<0, 0, 4>(z_yz, z_xx));
+    let (zt_yx, zt_zx) = (firsts(zt_yz, zt_x), firsts(&second(zt_yz), zt_x));
+    let (t_yx, t_zx, z_yz_xx) = (firsts(t_yz, t_x), firsts(&second(t_yz), t_x), firsts(z_yz, z_xx));
     out.set(2, [(&zt_yx, &t_zx), (&zt_zx, &t_yx), (minus_square, &z_yz_xx), (b_yz_xx, minus_trace)]);
     // A t, and det Z by the first row.
     let [a_xy_xz, a_yy_zz, a_yz_xx] = adjugate;
     out.set(3, [(a_xy_xz, t_x), (a_yy_zz, t_yz), (&first(a_yz_xx), &swapped(t_yz))]);
-    let by_first_row =
-        [lanes::<0, 0, 4>(t_x, z_xx), lanes::<0, 0, 4>(t_yz, z_xy_xz), lanes::<1, 1, 4>(t_yz, z_xy_xz)];
+    let by_first_row = [firsts(t_x, z_xx), firsts(t_yz, z_xy_xz), seconds(t_yz, z_xy_xz)];
     let [x, y, z] = &by_first_row;
     out.set(4, [(&second(a_yz_xx), x), (&first(a_xy_xz), y), (&second(a_xy_xz), z)]);
-    out.rows
+    out
 }
 
 /// `x N1 + y N2 + z N3 + w N4`.
@@ -297,7 +310,7 @@ mod tests {
         let eet = e * e.transpose();
         let c = (eet * 2.0 - Matrix3::from_diagonal_element(eet.trace())) * e / p;
         let [six_xy, six_xz, six_yy, six_zz, six_yz, six_xx, at_y, at_z, at_x, det] =
-            ten_cubics(&basis, p).map(|cubic| evaluate(&CUBIC, &cubic, v));
+            ten_cubics(&basis, p).rows.map(|cubic| evaluate(&CUBIC, &cubic, v));
         let six = Matrix3::new(six_xx, six_xy, six_xz, six_xy, six_yy, six_yz, six_xz, six_yz, six_zz);
         let antisymmetric = nalgebra::Vector3::new(at_x, at_y, at_z).cross_matrix() * -p;
         // C / 2 = six + (tᵀ S t + p² (h tr A − det Z) / 8) I, and tr(six) = −4 tᵀ S t − p² h tr A / 2.

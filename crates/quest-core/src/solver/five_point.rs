@@ -82,7 +82,7 @@ const MIXINGS: [[[f64; 4]; 4]; 2] = [
 fn null_space(matches: &[Correspondence]) -> Result<Basis, Degeneracy> {
     let row = |m: &Correspondence| outer(m.bearing2(), m.bearing1());
     let (basis, independent) = if let Ok(five) = <&[Correspondence; 5]>::try_from(matches) {
-        let (basis, pivot) = null_space::null_space(&mut five.each_ref().map(row));
+        let (basis, pivot) = null_space::null_space(&five.each_ref().map(row));
         (basis, pivot > DEPENDENT)
     } else {
         let (squares, [_, _, _, _, _, basis @ ..]) = principal_basis(matches.iter().map(row));

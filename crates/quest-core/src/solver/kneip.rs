@@ -101,7 +101,7 @@ impl Constraints {
             return Self { y, quartics: ten_quartics(&turned) };
         }
         // What is orthogonal to the essential matrices that fit best.
-        let (rows, _) = null_space::<4, 9, 5>(&mut solutions.basis.clone());
+        let (rows, _) = null_space::<4, 9, 5>(&solutions.basis);
         let y = rows.map(|row| g.to_rotation_matrix() * Matrix3::from_row_slice(&row));
         Self { y, quartics: minors_with_q(&y.each_ref().map(bilinear)) }
     }

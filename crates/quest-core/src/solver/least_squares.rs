@@ -40,7 +40,7 @@ pub(crate) fn null_vector(count: usize, rows: impl Iterator<Item = [f64; 9]>) ->
         for (row, given) in eight.iter_mut().zip(rows) {
             *row = given;
         }
-        let ([vector], pivot) = null_space(&mut eight);
+        let ([vector], pivot) = null_space(&eight);
         return (pivot > DEPENDENT).then_some(vector);
     }
     let (squares, [.., vector]) = eigen(gram(rows));

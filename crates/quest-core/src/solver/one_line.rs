@@ -54,11 +54,11 @@ fn of_plane(
     a: &[&Vector3<f64>; 5],
     b: &[&Vector3<f64>; 5],
 ) -> Option<[Matrix3<f64>; 2]> {
-    let mut rows = std::array::from_fn::<_, 5, _>(|i| {
+    let rows = std::array::from_fn::<_, 5, _>(|i| {
         let (alpha, beta) = (u.dot(a[i]), v.dot(a[i]));
         std::array::from_fn(|k| b[i][k % 3] * if k < 3 { alpha } else { beta })
     });
-    let ([[x, y, z, xx, yy, zz]], pivot) = null_space::<5, 6, 1>(&mut rows);
+    let ([[x, y, z, xx, yy, zz]], pivot) = null_space::<5, 6, 1>(&rows);
     if pivot < DEPENDENT {
         return None;
     }

@@ -29,6 +29,8 @@ pub(super) struct Chain<const N: usize> {
     /// `f_{D−1}` and the sign of the constant `f_D`.
     last_linear: [f64; 2],
     last: f64,
+    /// How often the sign changes along the chain at +∞; along the others of the `D` steps it changes at −∞.
+    changes_at_infinity: f64,
     /// By how much an error of the first members may have grown.
     magnified: f64,
 }
@@ -53,7 +55,7 @@ impl<const N: usize> Chain<N> {
         let mut sign = 1.0;
         let largest = |p: &[Two; N]| p.iter().fold(Two::ZERO, |largest, c| largest.max(c.abs())).to_array();
         let [mut error, mut error_below] = [&f, &g].map(|p| largest(p)[0].max(largest(p)[1]));
-        let mut magnified = 0.0_f64;
+        let (mut magnified, mut changes_at_infinity) = (0.0_f64, 0.0);
         for link in &mut links[..degree - 1] {
             let ([f0, f1], [_, g1]) = (f[0].to_array(), g[0].to_array());
             let slope = f0 * sign;
@@ -75,12 +77,21 @@ impl<const N: usize> Chain<N> {
             (error, error_below) = (error_below, ((1.0 + offset.abs()) * error_below + error) * inverse);
             magnified = magnified.max(error_below);
             *link = [offset, slope, weight];
+            changes_at_infinity += f64::from(u8::from(slope < 0.0));
             sign = 1.0_f64.copysign(leading);
             (f, g) = (g, rest);
         }
         let ([slope, offset], [last, _]) = (f[0].to_array(), g[0].to_array());
         let finite = p.iter().chain([&slope, &offset, &last]).all(|c| c.is_finite());
-        finite.then_some(Self { p, links, last_linear: [offset, slope], last, magnified })
+        changes_at_infinity += f64::from(u8::from((slope < 0.0) != (last < 0.0)));
+        finite.then_some(Self {
+            p,
+            links,
+            last_linear: [offset, slope],
+            last,
+            changes_at_infinity,
+            magnified,
+        })
     }
 
     /// Whether the number of real roots may be rounding's: the chain has lost its digits, or nearly breaks off at its end, where
@@ -109,12 +120,8 @@ impl<const N: usize> Chain<N> {
 
     /// A point beyond all roots on the side of `direction` (±1) from `end`; `None` where there are none.
     pub(super) fn bound(&self, direction: f64, end: End) -> Option<End> {
-        // At ±∞ the leading terms decide: x, and the slopes of the recurrence.
-        let mut at_infinity = u32::from((self.last_linear[1] * direction < 0.0) != (self.last < 0.0));
-        for [_, slope, _] in &self.links[..N - 2] {
-            at_infinity += u32::from(slope * direction < 0.0);
-        }
-        let (mut bound, at_infinity) = (end, f64::from(at_infinity));
+        let (mut bound, rising) = (end, self.changes_at_infinity);
+        let at_infinity = if direction < 0.0 { (N - 1) as f64 - rising } else { rising };
         while (bound.changes - at_infinity).abs() > 0.5 {
             [bound, _] = self.ends([4.0 * bound.x.abs().max(1.0) * direction; 2]);
             // A root this far out is one at infinity, of a polynomial of lower degree.
