@@ -62,22 +62,22 @@ struct Blocks<const C: usize>([Two; C]);
 impl<const C: usize> Blocks<C> {
     const COUNT: usize = C.div_ceil(2);
     /// The bits of the entries from each one on, and the unit vectors.
-    const FROM: [[[f64; 2]; C]; C] = Self::masks().0;
-    const UNIT: [[[f64; 2]; C]; C] = Self::masks().1;
+    const FROM: [[[f64; 2]; C]; C] = Self::table(f64::from_bits(u64::MAX), C);
+    const UNIT: [[[f64; 2]; C]; C] = Self::table(1.0, 1);
 
-    const fn masks() -> ([[[f64; 2]; C]; C], [[[f64; 2]; C]; C]) {
-        let (mut from, mut unit) = ([[[0.0; 2]; C]; C], [[[0.0; 2]; C]; C]);
+    /// Row by row a value in `count` entries from each one on.
+    const fn table(value: f64, count: usize) -> [[[f64; 2]; C]; C] {
+        let mut table = [[[0.0; 2]; C]; C];
         let mut k = 0;
         while k < C {
-            unit[k][k / 2][k % 2] = 1.0;
             let mut j = k;
-            while j < C {
-                from[k][j / 2][j % 2] = f64::from_bits(u64::MAX);
+            while j < C && j < k + count {
+                table[k][j / 2][j % 2] = value;
                 j += 1;
             }
             k += 1;
         }
-        (from, unit)
+        table
     }
 
     #[inline]
@@ -93,7 +93,15 @@ impl<const C: usize> Blocks<C> {
 
     #[inline]
     fn to_array(self) -> [f64; C] {
-        std::array::from_fn(|k| self.entry(k))
+        let mut row = [0.0; C];
+        let (pairs, rest) = row.as_chunks_mut::<2>();
+        for (pair, block) in pairs.iter_mut().zip(&self.0) {
+            *pair = block.to_array();
+        }
+        if let [last] = rest {
+            *last = self.entry(C - 1);
+        }
+        row
     }
 
     #[inline]

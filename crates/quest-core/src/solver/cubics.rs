@@ -197,17 +197,22 @@ struct Forms {
 impl Forms {
     #[inline]
     fn new(basis: &[Coordinates; 4]) -> Self {
-        let form = |i, j| -> Linears { std::array::from_fn(|m| Two::new([basis[m][i], basis[m][j]])) };
-        let trace: Linears = std::array::from_fn(|m| Two::splat(basis[m][3] + basis[m][4] + basis[m][5]));
+        // Two coordinates at a time as the null space wrote them: what reads across two writes waits for both.
+        let pair =
+            |k: usize| -> Linears { std::array::from_fn(|m| Two::new([basis[m][k], basis[m][k + 1]])) };
+        let (t_xy, t_z_xx, yy_zz) = (pair(0), pair(2), pair(4));
+        let (t_yz, xx) = (firsts(&second(&t_xy), &t_z_xx), second(&t_z_xx));
+        let (yy, zz) = (first(&yy_zz), second(&yy_zz));
+        let trace: Linears = std::array::from_fn(|m| xx[m] + yy[m] + zz[m]);
         let less = |x: Linears| -> Linears { std::array::from_fn(|m| trace[m] - x[m] * 2.0) };
         Self {
-            t_x: form(0, 0),
-            t_yz: form(1, 2),
+            t_x: first(&t_xy),
+            t_yz,
             trace,
-            z_xx: less(form(3, 3)),
-            z_yz: form(8, 8).map(|x| x * -2.0),
-            z_yy_zz: less(form(4, 5)),
-            z_xy_xz: form(6, 7).map(|x| x * -2.0),
+            z_xx: less(xx),
+            z_yz: std::array::from_fn(|m| Two::splat(basis[m][8] * -2.0)),
+            z_yy_zz: less(yy_zz),
+            z_xy_xz: pair(6).map(|x| x * -2.0),
         }
     }
 
@@ -260,7 +265,7 @@ impl Forms {
 }
 
 /// The ten divided cubics over [`CUBIC`]: the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
-pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> Cubics {
+pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let forms = Forms::new(basis);
     let Forms { t_x, t_yz, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
     let [zt_yz, zt_x_square] = &forms.turned();
@@ -280,7 +285,7 @@ pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> Cubics {
     let by_first_row = [firsts(t_x, z_xx), firsts(t_yz, z_xy_xz), seconds(t_yz, z_xy_xz)];
     let [x, y, z] = &by_first_row;
     out.set(4, [(&second(a_yz_xx), x), (&first(a_xy_xz), y), (&second(a_xy_xz), z)]);
-    out
+    out.rows
 }
 
 /// `x N1 + y N2 + z N3 + w N4`.
@@ -310,7 +315,7 @@ mod tests {
         let eet = e * e.transpose();
         let c = (eet * 2.0 - Matrix3::from_diagonal_element(eet.trace())) * e / p;
         let [six_xy, six_xz, six_yy, six_zz, six_yz, six_xx, at_y, at_z, at_x, det] =
-            ten_cubics(&basis, p).rows.map(|cubic| evaluate(&CUBIC, &cubic, v));
+            ten_cubics(&basis, p).map(|cubic| evaluate(&CUBIC, &cubic, v));
         let six = Matrix3::new(six_xx, six_xy, six_xz, six_xy, six_yy, six_yz, six_xz, six_yz, six_zz);
         let antisymmetric = nalgebra::Vector3::new(at_x, at_y, at_z).cross_matrix() * -p;
         // C / 2 = six + (tᵀ S t + p² (h tr A − det Z) / 8) I, and tr(six) = −4 tᵀ S t − p² h tr A / 2.

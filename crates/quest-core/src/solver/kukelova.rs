@@ -52,7 +52,7 @@ impl PoseSolver for Kukelova {
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         five_point::solve(self.kinds, matches, out, |solutions| {
-            let mut a = by_power(&trace_cubics(&solutions.basis).rows);
+            let mut a = by_power(&trace_cubics(&solutions.basis));
             if elimination::reduce(&mut a, CONSTANT) == 0.0 {
                 return false;
             }
@@ -106,7 +106,7 @@ mod tests {
     fn every_eigenvalue_is_a_common_zero_of_the_cubics() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let basis: Basis = std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-        let cubics = trace_cubics(&basis).rows;
+        let cubics = trace_cubics(&basis);
         let mut a = by_power(&cubics);
         assert!(elimination::reduce(&mut a, CONSTANT) > 0.0);
         let right = std::array::from_fn(|i| std::array::from_fn(|j| a[CONSTANT + i][10 + j]));

@@ -50,7 +50,7 @@ impl PoseSolver for LiHartley {
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         five_point::solve(self.kinds, matches, out, |solutions| {
-            let Some(hidden) = Hidden::new(&trace_cubics(&solutions.basis).rows) else { return false };
+            let Some(hidden) = Hidden::new(&trace_cubics(&solutions.basis)) else { return false };
             let polynomial = determinant(&hidden);
             let real = real_roots(&polynomial);
             for &z in real.as_slice() {
@@ -179,7 +179,7 @@ mod tests {
     fn determinant_is_that_of_the_matrix_everywhere() {
         let basis: Basis =
             std::array::from_fn(|m| std::array::from_fn(|k| ((3 * m + 7 * k) as f64 * 1.3 + 0.2).sin()));
-        let hidden = Hidden::new(&trace_cubics(&basis).rows).unwrap();
+        let hidden = Hidden::new(&trace_cubics(&basis)).unwrap();
         let polynomial = determinant(&hidden);
         let scale = polynomial.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
         for z in [-1.7, -0.3, 0.2, 0.9, 2.5] {

@@ -46,7 +46,7 @@ impl PoseSolver for Nister {
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         five_point::solve(Kinds::Exact, matches, out, |solutions| {
-            let (resultant, pivot) = Resultant::new(&mut trace_cubics(&solutions.basis).rows);
+            let (resultant, pivot) = Resultant::new(&mut trace_cubics(&solutions.basis));
             let roots = real_roots(&resultant.polynomial());
             for &z in roots.as_slice() {
                 solutions.push_real(&resultant.point(z));

@@ -158,7 +158,7 @@ struct Roots<'a> {
 
 impl<'a> Roots<'a> {
     fn new(basis: &'a [Coordinates; 4], alignment: &'a Alignment) -> Self {
-        let (resultant, pivot) = Resultant::new(&mut ten_cubics(basis, alignment.parallax).rows);
+        let (resultant, pivot) = Resultant::new(&mut ten_cubics(basis, alignment.parallax));
         let polynomial = resultant.polynomial();
         let mut real = real_roots(&polynomial);
         real.certain &= pivot > SMALL_PIVOT && !real.close && alignment.parallax > SMALL_PARALLAX;

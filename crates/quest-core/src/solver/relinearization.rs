@@ -83,7 +83,7 @@ fn starts(gram: &Gram, [.., v1, v2, v3]: &[Coordinates; 9], matches: &[Correspon
     let mut starts = Shortlist::new();
     // The cubics have four variables, the first of them for five matches alone.
     let basis = [[0.0; 9], *v1, *v2, *v3];
-    if let Some(factors) = eliminated(&ten_cubics(&basis, gram.alignment.parallax).rows) {
+    if let Some(factors) = eliminated(&ten_cubics(&basis, gram.alignment.parallax)) {
         add_solutions(&factors, gram, &basis, &mut starts);
     }
     for motion in motions_of_plane(matches, AGREEMENT).into_iter().flatten() {

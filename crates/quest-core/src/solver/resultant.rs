@@ -103,7 +103,7 @@ mod tests {
         for shift in 0..20 {
             let entry = |m: usize, k: usize| (((3 * m + 7 * k) as f64 + 0.37 * f64::from(shift)) * 1.3).sin();
             let basis = std::array::from_fn(|m| std::array::from_fn(|k| entry(m, k)));
-            let cubics = ten_cubics(&basis, 0.4).rows;
+            let cubics = ten_cubics(&basis, 0.4);
             let (resultant, pivot) = Resultant::new(&mut cubics.clone());
             for &z in real_roots(&resultant.polynomial()).as_slice() {
                 let point = resultant.point(z);

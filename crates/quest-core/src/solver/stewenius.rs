@@ -49,7 +49,7 @@ impl PoseSolver for Stewenius {
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
         five_point::solve(self.kinds, matches, out, |solutions| {
-            let Some(action) = Action::new(&trace_cubics(&solutions.basis).rows) else { return false };
+            let Some(action) = Action::new(&trace_cubics(&solutions.basis)) else { return false };
             let Some(values) = eigenvalues(&mut action.matrix()) else { return false };
             for value in values {
                 if value.im == 0.0 {
@@ -184,7 +184,7 @@ mod tests {
     fn every_eigenvalue_is_a_common_zero_of_the_cubics() {
         let mut rng = ChaCha8Rng::seed_from_u64(10);
         let basis: Basis = std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
-        let cubics = trace_cubics(&basis).rows;
+        let cubics = trace_cubics(&basis);
         let action = Action::new(&cubics).unwrap();
         for value in eigenvalues(&mut action.matrix()).unwrap() {
             let point = action.point(value).unwrap();

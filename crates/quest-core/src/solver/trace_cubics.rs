@@ -10,7 +10,7 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::cubics::{Cubics, Linears, first, firsts, negative, quadratics, second};
+use super::cubics::{Cubic, Cubics, Linears, first, firsts, negative, quadratics, second};
 use crate::algebra::two::Two;
 
 /// Four essential matrices, row by row.
@@ -18,7 +18,7 @@ pub(crate) type Basis = [[f64; 9]; 4];
 
 /// The ten cubics over [`CUBIC`](super::cubics::CUBIC): the trace constraint row by row, of each row the first two columns, then
 /// the last column, then the determinant.
-pub(crate) fn trace_cubics(basis: &Basis) -> Cubics {
+pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
     // Two entries of E, by their places in its rows.
     let e = |i: usize, j: usize| -> Linears { std::array::from_fn(|m| Two::new([basis[m][i], basis[m][j]])) };
     let product = |[a, b]: [usize; 2], [c, d]: [usize; 2]| {
@@ -53,7 +53,7 @@ pub(crate) fn trace_cubics(basis: &Basis) -> Cubics {
             (&firsts(&p22, &m2), &e(8, 2)),
         ],
     );
-    out
+    out.rows
 }
 
 #[cfg(test)]
@@ -71,7 +71,7 @@ mod tests {
         let e = Matrix3::from_row_slice(&combine(&basis, &v));
         let eet = e * e.transpose();
         let expected = (eet - Matrix3::from_diagonal_element(0.5 * eet.trace())) * e;
-        let cubics = trace_cubics(&basis).rows;
+        let cubics = trace_cubics(&basis);
         for i in 0..3 {
             for (j, place) in [2 * i, 2 * i + 1, 6 + i].into_iter().enumerate() {
                 assert!((evaluate(&CUBIC, &cubics[place], v) - expected[(i, j)]).abs() < 1e-13);
