@@ -21,29 +21,34 @@ pub fn best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
 ///
 /// A rotation preserves the angles between bearings, so that those to the first one tell all signs but a common one, and
 /// it preserves orientation: with the signs right, `Σ b aᵀ` is near `R Σ a aᵀ`, of positive determinant.
-pub(crate) fn best_rotation_of_lines(matches: &[Correspondence]) -> Option<UnitQuaternion<f64>> {
+///
+/// `sum` is the [`outer_sum`].
+pub(crate) fn best_rotation_of_lines(
+    matches: &[Correspondence],
+    sum: &Matrix3<f64>,
+) -> Option<UnitQuaternion<f64>> {
     let first = matches.first()?;
     let sign = |m: &Correspondence| {
         1.0_f64.copysign(first.bearing1().dot(m.bearing1()) * first.bearing2().dot(m.bearing2()))
     };
     let turned = matches.iter().any(|m| sign(m) < 0.0);
-    let common = 1.0_f64.copysign(outer_sum(matches, sign).determinant());
+    let determinant = if turned { signed_sum(matches, sign).determinant() } else { sum.determinant() };
+    let common = 1.0_f64.copysign(determinant);
     (turned || common < 0.0).then(|| align(matches, |m| common * sign(m)))
 }
 
-/// `Σ b aᵀ`, with signs.
-fn outer_sum(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> Matrix3<f64> {
+/// `Σ b aᵀ`.
+pub(crate) fn outer_sum(matches: &[Correspondence]) -> Matrix3<f64> {
+    signed_sum(matches, |_| 1.0)
+}
+
+fn signed_sum(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> Matrix3<f64> {
     matches.iter().map(|m| m.bearing2() * (m.bearing1() * sign(m)).transpose()).sum()
 }
 
 fn align(matches: &[Correspondence], sign: impl Fn(&Correspondence) -> f64) -> UnitQuaternion<f64> {
-    let sum = outer_sum(matches, &sign);
+    let sum = signed_sum(matches, &sign);
     polished(rotation_of_outer_sum(&sum, matches.len()), matches, sign)
-}
-
-/// [`best_rotation`] to rounding over how far the bearings are from a line.
-pub(crate) fn nearly_best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
-    rotation_of_outer_sum(&outer_sum(matches, |_| 1.0), matches.len())
 }
 
 /// The rotation that best aligns `count` bearings with `Σ b aᵀ = sum`, to rounding over how far they are from a line.

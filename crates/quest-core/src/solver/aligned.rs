@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::null_space::null_space;
 use crate::algebra::number::Number;
-use crate::alignment::{best_rotation, best_rotation_of_lines, nearly_best_rotation};
+use crate::alignment::{best_rotation, best_rotation_of_lines, outer_sum, rotation_of_outer_sum};
 use crate::degeneracy::diagnose;
 use crate::{Correspondence, Degeneracy};
 
@@ -47,7 +47,8 @@ pub(crate) struct Alignment {
 
 impl Alignment {
     pub(crate) fn new(matches: &[Correspondence]) -> Self {
-        let nearly = Self::with_rotation(nearly_best_rotation(matches), matches);
+        let sum = outer_sum(matches);
+        let nearly = Self::with_rotation(rotation_of_outer_sum(&sum, matches.len()), matches);
         let rays = if nearly.parallax > LARGE_PARALLAX {
             nearly
         } else {
@@ -58,7 +59,7 @@ impl Alignment {
             return rays;
         }
         // The constraints hold for lines as well as for rays, and so must what keeps them well scaled.
-        match best_rotation_of_lines(matches).map(|q0_21| Self::with_rotation(q0_21, matches)) {
+        match best_rotation_of_lines(matches, &sum).map(|q0_21| Self::with_rotation(q0_21, matches)) {
             Some(lines) if lines.parallax < rays.parallax => lines,
             _ => rays,
         }

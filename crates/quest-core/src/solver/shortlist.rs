@@ -67,7 +67,8 @@ impl Item {
 /// Motions found so far, without duplicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Shortlist {
-    items: [Item; Candidates::CAPACITY],
+    /// Optional, as nothing has to be written of those that are not there.
+    items: [Option<Item>; Candidates::CAPACITY],
     len: usize,
     /// Motions closer than this are one.
     same: f64,
@@ -75,9 +76,7 @@ pub(crate) struct Shortlist {
 
 impl Shortlist {
     pub(crate) fn new() -> Self {
-        let motion = Motion { q_21: UnitQuaternion::identity(), direction: Vector3::z() };
-        let item = Item { kind: CandidateKind::Exact, motion, is_pair: false };
-        Self { items: [item; Candidates::CAPACITY], len: 0, same: SAME }
+        Self { items: [None; Candidates::CAPACITY], len: 0, same: SAME }
     }
 
     /// For solutions of five matches, which with little parallax differ by more than [`SAME`] where they are found twice.
@@ -87,7 +86,7 @@ impl Shortlist {
 
     /// The motions, of two twisted partners one.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Item> {
-        self.items[..self.len].iter()
+        self.items[..self.len].iter().flatten()
     }
 
     /// How many motions there are of a kind.
@@ -103,7 +102,7 @@ impl Shortlist {
     fn retain_where(&mut self, keep: impl Fn(&Item) -> bool) {
         let mut kept = 0;
         for k in 0..self.len {
-            if keep(&self.items[k]) {
+            if self.items[k].as_ref().is_some_and(&keep) {
                 self.items[kept] = self.items[k];
                 kept += 1;
             }
@@ -132,7 +131,7 @@ impl Shortlist {
             self.retain_where(|old| !(replaces(old) && old.covers(new, same)));
         }
         if let Some(place) = self.items.get_mut(self.len) {
-            *place = *new;
+            *place = Some(*new);
             self.len += 1;
         }
     }
@@ -206,14 +205,17 @@ impl Shortlist {
     /// Where descents on the Sampson errors lead, and the smallest sum of their squares.
     fn descended(&self, matches: &[Correspondence], until: &Until) -> (Self, f64) {
         let (mut minima, mut smallest) = (Self { same: SAME_MINIMUM, ..Self::new() }, f64::INFINITY);
-        for items in self.items[..self.len].chunks(2) {
-            let mut motions = [items[0].motion, items[items.len() - 1].motion];
-            let costs = if items.len() == 1 {
+        let mut items = self.iter();
+        while let Some(first) = items.next() {
+            let second = items.next();
+            let mut motions = [first.motion, second.unwrap_or(first).motion];
+            let costs = if second.is_none() {
                 [motions[0].minimise_sampson(matches, f64::INFINITY, until); 2]
             } else {
                 two_descents::minimise_sampson(&mut motions, matches, until)
             };
-            for ((item, motion), cost) in items.iter().zip(motions).zip(costs) {
+            for ((item, motion), cost) in [Some(first), second].into_iter().flatten().zip(motions).zip(costs)
+            {
                 smallest = smallest.min(cost);
                 minima.push_pair(item.kind, motion);
             }
