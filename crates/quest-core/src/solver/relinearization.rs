@@ -83,7 +83,12 @@ fn starts(gram: &Gram, [.., v1, v2, v3]: &[Coordinates; 9], matches: &[Correspon
     let mut starts = Shortlist::new();
     // The cubics have four variables, the first of them for five matches alone.
     let basis = [[0.0; 9], *v1, *v2, *v3];
-    if let Some(factors) = eliminated(&ten_cubics(&basis, gram.alignment.parallax)) {
+    let p = gram.alignment.parallax;
+    // The squares of the entries of the trace constraint, where those off the diagonal stand twice, and the antisymmetric part has
+    // the factor p: without it, noise of the direction of the translation would count most.
+    let (twice, antisymmetric) = (8.0, 2.0 * p * p);
+    let weights = [twice, twice, 4.0, 4.0, twice, 4.0, antisymmetric, antisymmetric, antisymmetric, 1.0];
+    if let Some(factors) = eliminated(&ten_cubics(&basis, p), &weights) {
         add_solutions(&factors, gram, &basis, &mut starts);
     }
     for motion in motions_of_plane(matches, AGREEMENT).into_iter().flatten() {
@@ -116,15 +121,15 @@ const PRODUCTS: [usize; 10] = {
     places
 };
 
-/// The four products without `s_3` by the six with it, in the least-squares sense of the cubics; `None` where they do not
+/// The four products without `s_3` by the six with it, in the least-squares sense of the cubics with weights; `None` where they do not
 /// determine these.
-fn eliminated(cubics: &[Cubic; 10]) -> Option<[[f64; 6]; 4]> {
+fn eliminated(cubics: &[Cubic; 10], weights: &[f64; 10]) -> Option<[[f64; 6]; 4]> {
     let mut normal = [[0.0; 10]; 4];
-    for cubic in cubics {
+    for (cubic, weight) in cubics.iter().zip(weights) {
         let row = PRODUCTS.map(|place| cubic[place]);
         for (sums, factor) in normal.iter_mut().zip(row) {
             for (sum, x) in sums.iter_mut().zip(row) {
-                *sum += factor * x;
+                *sum += weight * factor * x;
             }
         }
     }
@@ -216,7 +221,7 @@ mod tests {
         });
         let y: [f64; 6] = std::array::from_fn(|k| cubic[PRODUCTS[4 + k]]);
         let value = (0.6 * s[0] + 0.8 * s[1]) / s[2];
-        for (row, y_i) in action(&eliminated(&cubics).unwrap()).iter().zip(y) {
+        for (row, y_i) in action(&eliminated(&cubics, &[1.0; 10]).unwrap()).iter().zip(y) {
             let image: f64 = row.iter().zip(y).map(|(a, y)| a * y).sum();
             assert!((image - value * y_i).abs() < 1e-12);
         }
