@@ -1,6 +1,7 @@
 //! The ten cubics of the parallax-safe form, over twenty monomials.
 //!
-//! As the scalar solver derives them, halved: with `K = [t]×` and `E = K + p S`
+//! The trace constraint divided by `p` as the scalar solver's module derives it, halved, and not parted into its symmetric and
+//! antisymmetric parts as there: with `K = [t]×` and `E = K + p S`
 //!
 //! ```text
 //! Λ = 2 (K S − S K) + p (2 S² − tr(S²) I)
@@ -10,7 +11,7 @@
 
 use super::lane::{F, Float, Lanes};
 use super::null_space::Basis;
-use crate::solver::cubics::{PRODUCT, SQUARE};
+use crate::solver::forms::{PRODUCT, SQUARE};
 
 type Linear<L> = [F<L>; 4];
 type Quadratic<L> = [F<L>; 10];
@@ -23,7 +24,7 @@ const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// The ten cubics, and room to compute them in.
 pub(super) struct Cubics<L: Lanes<f64>> {
-    /// One for each monomial of [`CUBIC`](crate::solver::cubics::CUBIC).
+    /// One for each monomial of [`CUBIC`](crate::solver::forms::CUBIC).
     pub(super) columns: [Column<L>; 20],
     /// Of three cubics the quadratic factors of the four variables.
     factors: [[Quadratic<L>; 4]; 3],

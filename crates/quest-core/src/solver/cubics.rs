@@ -8,180 +8,56 @@
 //! 2 E Eᵀ − tr(E Eᵀ) I = −2 t tᵀ + p Λ,      Λ = 2 (K S − S K) + p (2 S² − tr(S²) I)
 //! ```
 //!
-//! and as `tᵀ K = 0`, every term of the trace constraint `(2 E Eᵀ − tr(E Eᵀ) I) E = 0` carries the factor `p`. Divided:
+//! and as `tᵀ K = 0`, every term of the trace constraint `(2 E Eᵀ − tr(E Eᵀ) I) E = 0` carries the factor `p`. Divided by it:
 //!
 //! ```text
-//! C = −2 t (tᵀ S) + Λ E = 0                                       nine cubics
-//! det(tr(S) I − 2 S) = 0                                          the tenth
+//! C = −2 t tᵀ S + Λ E = C0 + p C1 + p² C2 = 0
+//! C0 = 2 K S K − 2 S K² − 2 t tᵀ S      C1 = 2 (K S² + S² K) − tr(S²) K − 2 S K S      C2 = (2 S² − tr(S²) I) S
 //! ```
 //!
-//! The tenth stands in place of `det E = 0`. The adjugate of `K` is `t tᵀ`, and the trace of a symmetric times an antisymmetric
-//! matrix vanishes:
+//! For a symmetric matrix `S` with `h = tr S` and adjugate `adj S`
+//!
+//! ```text
+//! K S K = −S t tᵀ − t tᵀ S + (tᵀ S t) I + h t tᵀ − |t|² (h I − S)
+//! K S + S K = [(h I − S) t]×            S K S = [adj(S) t]×
+//! S² = adj S + h S − ½ (h² − tr S²) I   (Cayley, Hamilton)
+//! ```
+//!
+//! so that `C0` and `C2` are symmetric, and `C1` is antisymmetric. With `Z = h I − 2 S`, of the trace `h`, and `A = adj Z`
+//!
+//! ```text
+//! C1 = [c]×,  c = (2 tr(S²) I − h² I − 4 S² + 2 h S) t = −A t
+//! C0 / 2 = (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − h t tᵀ + (tᵀ S t) I
+//! C2 / 2 = ¼ h (A − tr(A) I) + ⅛ h tr(A) I − ⅛ det(Z) I
+//! ```
+//!
+//! and the antisymmetric part can be divided by `p` once more. The determinant is
 //!
 //! ```text
 //! det E = p tᵀ S t + p³ det S
-//! tr C  = −2 tᵀ S t + p² (2 tr S³ − tr S tr S²)
-//! det(tr(S) I − 2 S) = tr S tr S² − 2 tr S³ − 2 det S             by the eigenvalues of S
-//! tr C + 2 det(E) / p = −p² det(tr(S) I − 2 S)
+//! tr C + 2 det(E) / p = −p² det Z
 //! ```
 //!
-//! As `p → 0` the ten become the equations of the differential five-point problem, and nothing degenerates.
+//! so that the constraints are together
+//!
+//! ```text
+//! (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − h t tᵀ + ¼ p² h (A − tr(A) I) = 0        six cubics
+//! A t = 0                                                                three
+//! det Z = 0                                                              one
+//! ```
+//!
+//! In the six the multiples of `I` are left out: they vanish with `det Z` and the trace of what stays,
+//! `2 tᵀ Z t − 2 h |t|² − ½ p² h tr A = −4 (tᵀ S t + ⅛ p² h tr A)`. As `p → 0` the ten become the equations of the
+//! differential five-point problem, and nothing degenerates.
 //!
 //! `resultant.rs` reduces them to a polynomial in `z`.
 
 use super::aligned::Coordinates;
-use crate::algebra::monomials::{homogeneous, position, sum};
+use super::forms::{
+    Cubic, Cubics, Linears, Quadratics, first, firsts, negative, quadratics, second, seconds, swapped,
+};
 use crate::algebra::number::Number;
 use crate::algebra::two::Two;
-
-/// Exponents of `(x, y, z, w)` of the ten quadratic monomials.
-const QUADRATIC: [[u8; 4]; 10] = homogeneous::<10>(2);
-
-/// Exponents of the twenty cubic monomials: ten to eliminate, the rest with `x`, with `y` and with neither, by falling
-/// powers of `z`.
-pub(crate) const CUBIC: [[u8; 4]; 20] = [
-    [3, 0, 0, 0],
-    [0, 3, 0, 0],
-    [2, 1, 0, 0],
-    [1, 2, 0, 0],
-    [2, 0, 1, 0],
-    [2, 0, 0, 1],
-    [0, 2, 1, 0],
-    [0, 2, 0, 1],
-    [1, 1, 1, 0],
-    [1, 1, 0, 1],
-    [1, 0, 2, 0],
-    [1, 0, 1, 1],
-    [1, 0, 0, 2],
-    [0, 1, 2, 0],
-    [0, 1, 1, 1],
-    [0, 1, 0, 2],
-    [0, 0, 3, 0],
-    [0, 0, 2, 1],
-    [0, 0, 1, 2],
-    [0, 0, 0, 3],
-];
-
-const VARIABLES: [[u8; 4]; 4] = homogeneous::<4>(1);
-
-/// The quadratic monomial of two variables.
-pub(crate) const SQUARE: [[usize; 4]; 4] = {
-    let mut table = [[0; 4]; 4];
-    let mut a = 0;
-    while a < 16 {
-        table[a / 4][a % 4] = position(&QUADRATIC, sum(VARIABLES[a / 4], VARIABLES[a % 4]));
-        a += 1;
-    }
-    table
-};
-
-/// The cubic monomial of a quadratic one and a variable.
-pub(crate) const PRODUCT: [[usize; 4]; 10] = {
-    let mut table = [[0; 4]; 10];
-    let mut a = 0;
-    while a < 40 {
-        table[a / 4][a % 4] = position(&CUBIC, sum(QUADRATIC[a / 4], VARIABLES[a % 4]));
-        a += 1;
-    }
-    table
-};
-
-pub(crate) type Cubic = [f64; 20];
-
-/// Two linear forms in `(x, y, z, w)` side by side, and two quadratic ones.
-pub(crate) type Linears = [Two; 4];
-pub(crate) type Quadratics = [Two; 10];
-
-/// The sums of products of linear forms, by [`QUADRATIC`].
-///
-/// Not in line: a few forms fit into the registers, all of those that are needed do not.
-#[inline(never)]
-pub(crate) fn quadratics<const N: usize>(terms: [(&Linears, &Linears); N]) -> Quadratics {
-    let product = |i: usize, j: usize| {
-        let (a, b) = terms[0];
-        terms[1..].iter().fold(a[i] * b[j], |sum, (a, b)| sum + a[i] * b[j])
-    };
-    let mut out = [Two::ZERO; 10];
-    for i in 0..4 {
-        out[SQUARE[i][i]] = product(i, i);
-        for j in 0..i {
-            out[SQUARE[i][j]] = product(i, j) + product(j, i);
-        }
-    }
-    out
-}
-
-/// Ten cubics over [`CUBIC`], and room to compute them in.
-pub(crate) struct Cubics {
-    pub(crate) rows: [Cubic; 10],
-    /// The quadratic factors of the four variables in two cubics.
-    factors: [Quadratics; 4],
-}
-
-impl Cubics {
-    pub(crate) fn new() -> Self {
-        Self { rows: [[0.0; 20]; 10], factors: [[Two::ZERO; 10]; 4] }
-    }
-
-    /// Pair `pair` of the cubics, two rows, as sums of products of quadratic and linear forms.
-    ///
-    /// Summed variable by variable of the linear forms: the registers do not hold twenty coefficients.
-    pub(crate) fn set<const N: usize>(&mut self, pair: usize, terms: [(&Quadratics, &Linears); N]) {
-        let (a, b) = terms[0];
-        for (v, factor) in self.factors.iter_mut().enumerate() {
-            for i in 0..10 {
-                factor[i] = terms[1..].iter().fold(a[i] * b[v], |sum, (a, b)| sum + a[i] * b[v]);
-            }
-        }
-        let mut sums = [Two::ZERO; 20];
-        for v in 0..4 {
-            for i in 0..10 {
-                sums[PRODUCT[i][v]] += self.factors[v][i];
-            }
-        }
-        let (first, second) = self.rows[2 * pair..][..2].split_at_mut(1);
-        let rows = first[0].as_chunks_mut::<2>().0.iter_mut().zip(second[0].as_chunks_mut::<2>().0);
-        for ((first, second), sums) in rows.zip(sums.as_chunks::<2>().0) {
-            [*first, *second] = Two::transpose(*sums).map(Two::to_array);
-        }
-    }
-}
-
-/// The first lane of `x` beside the first of `y`.
-///
-/// By the compiler's shuffles: what is put together from numbers goes through memory, and waits there.
-#[inline]
-pub(crate) fn firsts<const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
-    std::array::from_fn(|k| Two::transpose([x[k], y[k]])[0])
-}
-
-/// The second lane of `x` beside the second of `y`.
-#[inline]
-pub(crate) fn seconds<const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
-    std::array::from_fn(|k| Two::transpose([x[k], y[k]])[1])
-}
-
-/// The first of two on both lanes.
-#[inline]
-pub(crate) fn first<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    firsts(x, x)
-}
-
-/// The second of two on both lanes.
-#[inline]
-pub(crate) fn second<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    seconds(x, x)
-}
-
-#[inline]
-fn swapped<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    firsts(&second(x), x)
-}
-
-#[inline]
-pub(crate) fn negative(x: &Linears) -> Linears {
-    x.map(|x| -x)
-}
 
 /// Entries of `t` and of `Z`, two by two; what has one name stands on both lanes.
 struct Forms {
@@ -264,7 +140,7 @@ impl Forms {
     }
 }
 
-/// The ten divided cubics over [`CUBIC`]: the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
+/// The ten divided cubics over [`CUBIC`](super::forms::CUBIC): the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
 pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let forms = Forms::new(basis);
     let Forms { t_x, t_yz, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
@@ -300,6 +176,7 @@ pub(crate) fn combine<T: Number>(basis: &[Coordinates; 4], point: &[T; 4]) -> [T
 mod tests {
     use super::*;
     use crate::algebra::monomials::evaluate;
+    use crate::solver::forms::CUBIC;
     use nalgebra::Matrix3;
 
     #[test]

@@ -13,7 +13,7 @@
 
 use nalgebra::ComplexField;
 
-use super::cubics::{CUBIC, Cubic};
+use super::forms::{CUBIC, Cubic};
 use crate::algebra::elimination;
 use crate::algebra::monomials::position;
 

@@ -97,7 +97,7 @@ fn linearised(right: &[[f64; 10]; 6]) -> [[f64; 10]; 10] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::cubics::CUBIC;
+    use crate::solver::forms::CUBIC;
     use crate::solver::trace_cubics::Basis;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

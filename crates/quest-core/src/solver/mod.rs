@@ -2,10 +2,11 @@
 
 mod aligned;
 mod consensus;
-pub(crate) mod cubics;
+mod cubics;
 pub mod eight_point;
 pub(crate) mod essential;
 mod five_point;
+pub(crate) mod forms;
 mod gram;
 mod hidden_variable;
 pub mod homography;

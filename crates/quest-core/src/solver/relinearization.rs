@@ -45,8 +45,9 @@ use nalgebra::{Complex, ComplexField, Quaternion, UnitQuaternion};
 
 use super::aligned::Coordinates;
 use super::consensus::AGREEMENT;
-use super::cubics::{CUBIC, Cubic, combine, ten_cubics};
+use super::cubics::{combine, ten_cubics};
 use super::essential::{decompose, real_part, twisted};
+use super::forms::{CUBIC, Cubic};
 use super::gram::Gram;
 use super::homography::motions_of_plane;
 use super::moments::Pencil;

@@ -9,7 +9,7 @@
 //!
 //! `X` and `Y` have degree three, `W` has degree four, and the determinant of the three equations has degree ten.
 
-use super::cubics::Cubic;
+use super::forms::Cubic;
 use crate::algebra::elimination;
 use crate::algebra::number::Number;
 
@@ -24,7 +24,7 @@ pub(crate) struct Resultant {
 }
 
 impl Resultant {
-    /// The three equations of the ten cubics over [`CUBIC`](super::cubics::CUBIC) of an essential matrix, which are overwritten, and
+    /// The three equations of the ten cubics over [`CUBIC`](super::forms::CUBIC) of an essential matrix, which are overwritten, and
     /// how far the elimination was from singular.
     #[inline]
     pub(crate) fn new(cubics: &mut [Cubic; 10]) -> (Self, f64) {
@@ -95,7 +95,8 @@ mod tests {
     use super::*;
     use crate::algebra::monomials::evaluate;
     use crate::algebra::polynomial::real_roots;
-    use crate::solver::cubics::{CUBIC, ten_cubics};
+    use crate::solver::cubics::ten_cubics;
+    use crate::solver::forms::CUBIC;
 
     #[test]
     fn roots_are_common_zeros_of_the_cubics() {

@@ -28,7 +28,7 @@
 
 use nalgebra::ComplexField;
 
-use super::cubics::{CUBIC, Cubic};
+use super::forms::{CUBIC, Cubic};
 use super::trace_cubics::trace_cubics;
 use super::{Kinds, PoseSolver, five_point};
 use crate::algebra::eigenvalues::eigenvalues;

@@ -10,13 +10,13 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::cubics::{Cubic, Cubics, Linears, first, firsts, negative, quadratics, second};
+use super::forms::{Cubic, Cubics, Linears, first, firsts, negative, quadratics, second};
 use crate::algebra::two::Two;
 
 /// Four essential matrices, row by row.
 pub(crate) type Basis = [[f64; 9]; 4];
 
-/// The ten cubics over [`CUBIC`](super::cubics::CUBIC): the trace constraint row by row, of each row the first two columns, then
+/// The ten cubics over [`CUBIC`](super::forms::CUBIC): the trace constraint row by row, of each row the first two columns, then
 /// the last column, then the determinant.
 pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
     // Two entries of E, by their places in its rows.
@@ -60,7 +60,8 @@ pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
 mod tests {
     use super::*;
     use crate::algebra::monomials::evaluate;
-    use crate::solver::cubics::{CUBIC, combine};
+    use crate::solver::cubics::combine;
+    use crate::solver::forms::CUBIC;
     use nalgebra::Matrix3;
 
     #[test]
