@@ -12,11 +12,12 @@
 
 use std::array::from_fn;
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::{smallest_eigenvector_3, smallest_eigenvectors_3};
 use crate::algebra::two::{
-    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, rotation, scaled, side_by_side,
+    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled, side_by_side,
+    unit_quaternions,
 };
 use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
@@ -70,8 +71,7 @@ pub fn with_depths(
     direction: &Vector3<f64>,
     matches: &[Correspondence],
 ) -> Completed {
-    let q = q_21.quaternion();
-    let (q, t) = ([q.w, q.i, q.j, q.k].map(Two::splat), both(direction));
+    let (q, t) = (quaternions(&q_21, &q_21), both(direction));
     let r_21 = rotation(&q);
     let mut tally = Tally::default();
     for pair in matches.chunks(2) {
@@ -218,15 +218,13 @@ impl Tally {
         let t_21 = scaled(direction, flip.select(-length, length)).map(Two::to_array);
         let in_front = (self.at_infinity + flip.select(self.behind, self.front)).to_array();
         let residual = (self.squares / matches.len() as f64).sqrt().to_array();
-        let (q_21, absolute) = (q_21.map(Two::to_array), self.absolute.to_array());
+        let (q_21, absolute) = (unit_quaternions(q_21), self.absolute.to_array());
         from_fn(|k| {
-            let ([w, i, j, l], [x, y, z]) = (q_21.map(|q| q[k]), t_21.map(|t| t[k]));
-            let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, l));
             if absolute[k] == 0.0 {
-                let pose = RelativePose::new(q_21, Vector3::zeros());
+                let pose = RelativePose::new(q_21[k], Vector3::zeros());
                 return Completed { pose, in_front: whole(in_front[k]), residual: pose.residual(matches) };
             }
-            let pose = RelativePose::new(q_21, Vector3::new(x, y, z));
+            let pose = RelativePose::new(q_21[k], Vector3::from(t_21.map(|t| t[k])));
             Completed { pose, in_front: whole(in_front[k]), residual: residual[k] }
         })
     }

@@ -3,7 +3,7 @@
 
 use std::array::from_fn;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 pub(crate) use wide::f64x2 as Two;
 
 /// Two vectors.
@@ -46,6 +46,20 @@ pub(crate) fn times(m: &Matrix3<f64>, v: &TwoVectors) -> TwoVectors {
 #[inline]
 pub(crate) fn scaled<const N: usize>(x: &[Two; N], factor: Two) -> [Two; N] {
     x.map(|x| x * factor)
+}
+
+/// Two unit quaternions side by side.
+#[inline]
+pub(crate) fn quaternions(first: &UnitQuaternion<f64>, second: &UnitQuaternion<f64>) -> TwoQuaternions {
+    let (p, q) = (first.quaternion(), second.quaternion());
+    [[p.w, q.w], [p.i, q.i], [p.j, q.j], [p.k, q.k]].map(Two::new)
+}
+
+/// Unit quaternions one by one.
+#[inline]
+pub(crate) fn unit_quaternions(q: &TwoQuaternions) -> [UnitQuaternion<f64>; 2] {
+    let [w, x, y, z] = q.map(Two::to_array);
+    from_fn(|k| UnitQuaternion::new_unchecked(Quaternion::new(w[k], x[k], y[k], z[k])))
 }
 
 /// `p ⊗ q`.

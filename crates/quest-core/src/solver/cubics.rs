@@ -54,7 +54,8 @@
 
 use super::aligned::Coordinates;
 use super::forms::{
-    Cubic, Cubics, Linears, Quadratics, first, firsts, negative, quadratics, second, seconds, swapped,
+    Cubic, Cubics, Linears, Quadratics, crossed, first, firsts, negative, quadratics, second, seconds,
+    swapped,
 };
 use crate::algebra::number::Number;
 use crate::algebra::two::Two;
@@ -63,6 +64,8 @@ use crate::algebra::two::Two;
 struct Forms {
     t_x: Linears,
     t_yz: Linears,
+    t_yx: Linears,
+    t_zx: Linears,
     trace: Linears,
     z_xx: Linears,
     z_yz: Linears,
@@ -77,13 +80,15 @@ impl Forms {
         let pair =
             |k: usize| -> Linears { std::array::from_fn(|m| Two::new([basis[m][k], basis[m][k + 1]])) };
         let (t_xy, t_z_xx, yy_zz) = (pair(0), pair(2), pair(4));
-        let (t_yz, xx) = (firsts(&second(&t_xy), &t_z_xx), second(&t_z_xx));
+        let (t_x, t_yz, xx) = (first(&t_xy), crossed(&t_xy, &t_z_xx), second(&t_z_xx));
         let (yy, zz) = (first(&yy_zz), second(&yy_zz));
         let trace: Linears = std::array::from_fn(|m| xx[m] + yy[m] + zz[m]);
         let less = |x: Linears| -> Linears { std::array::from_fn(|m| trace[m] - x[m] * 2.0) };
         Self {
-            t_x: first(&t_xy),
+            t_x,
             t_yz,
+            t_yx: firsts(&t_yz, &t_x),
+            t_zx: crossed(&t_yz, &t_x),
             trace,
             z_xx: less(xx),
             z_yz: std::array::from_fn(|m| Two::splat(basis[m][8] * -2.0)),
@@ -125,10 +130,9 @@ impl Forms {
     /// `B = t tᵀ + p² / 4 (tr(A) I − A)`, in the places of `A`.
     #[inline]
     fn beside_trace(&self, [a_xy_xz, a_yy_zz, a_yz_xx]: &[Quadratics; 3], p: f64) -> [Quadratics; 3] {
-        let Self { t_x, t_yz, .. } = self;
-        let (t_yx, t_zx) = (firsts(t_yz, t_x), firsts(&second(t_yz), t_x));
+        let Self { t_x, t_yz, t_yx, t_zx, .. } = self;
         let quarter = 0.25 * p * p;
-        let mut b = [quadratics([(t_x, t_yz)]), quadratics([(t_yz, t_yz)]), quadratics([(&t_yx, &t_zx)])];
+        let mut b = [quadratics([(t_x, t_yz)]), quadratics([(t_yz, t_yz)]), quadratics([(t_yx, t_zx)])];
         let (a_zz_yy, a_xx) = (swapped(a_yy_zz), second(a_yz_xx));
         for k in 0..10 {
             let [minus_yz_and_rest, _] = Two::transpose([-a_yz_xx[k], a_yy_zz[k] + a_zz_yy[k]]);
@@ -140,10 +144,11 @@ impl Forms {
     }
 }
 
-/// The ten divided cubics over [`CUBIC`](super::forms::CUBIC): the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`, and `det Z`.
+/// The ten divided cubics over [`CUBIC`](super::forms::CUBIC): the six at `xy, xz, yy, zz, yz, xx`, those of `A t` at `y, z, x`,
+/// and `det Z`.
 pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     let forms = Forms::new(basis);
-    let Forms { t_x, t_yz, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
+    let Forms { t_x, t_yz, t_yx, t_zx, trace, z_xx, z_yz, z_yy_zz, z_xy_xz } = &forms;
     let [zt_yz, zt_x_square] = &forms.turned();
     let adjugate = &forms.adjugate();
     let [b_xy_xz, b_yy_zz, b_yz_xx] = &forms.beside_trace(adjugate, p);
@@ -152,15 +157,13 @@ pub(crate) fn ten_cubics(basis: &[Coordinates; 4], p: f64) -> [Cubic; 10] {
     // (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − tr(Z) B.
     out.set(0, [(zt_x, t_yz), (zt_yz, t_x), (minus_square, z_xy_xz), (b_xy_xz, minus_trace)]);
     out.set(1, [(zt_yz, &t_yz.map(|t| t + t)), (minus_square, z_yy_zz), (b_yy_zz, minus_trace)]);
-    let (zt_yx, zt_zx) = (firsts(zt_yz, zt_x), firsts(&second(zt_yz), zt_x));
-    let (t_yx, t_zx, z_yz_xx) = (firsts(t_yz, t_x), firsts(&second(t_yz), t_x), firsts(z_yz, z_xx));
-    out.set(2, [(&zt_yx, &t_zx), (&zt_zx, &t_yx), (minus_square, &z_yz_xx), (b_yz_xx, minus_trace)]);
+    let (zt_yx, zt_zx, z_yz_xx) = (firsts(zt_yz, zt_x), crossed(zt_yz, zt_x), firsts(z_yz, z_xx));
+    out.set(2, [(&zt_yx, t_zx), (&zt_zx, t_yx), (minus_square, &z_yz_xx), (b_yz_xx, minus_trace)]);
     // A t, and det Z by the first row.
     let [a_xy_xz, a_yy_zz, a_yz_xx] = adjugate;
     out.set(3, [(a_xy_xz, t_x), (a_yy_zz, t_yz), (&first(a_yz_xx), &swapped(t_yz))]);
-    let by_first_row = [firsts(t_x, z_xx), firsts(t_yz, z_xy_xz), seconds(t_yz, z_xy_xz)];
-    let [x, y, z] = &by_first_row;
-    out.set(4, [(&second(a_yz_xx), x), (&first(a_xy_xz), y), (&second(a_xy_xz), z)]);
+    let (x, y, z) = (firsts(t_x, z_xx), firsts(t_yz, z_xy_xz), seconds(t_yz, z_xy_xz));
+    out.set(4, [(&second(a_yz_xx), &x), (&first(a_xy_xz), &y), (&second(a_xy_xz), &z)]);
     out.rows
 }
 

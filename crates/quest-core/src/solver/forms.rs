@@ -142,9 +142,15 @@ pub(crate) fn second<const N: usize>(x: &[Two; N]) -> [Two; N] {
     seconds(x, x)
 }
 
+/// The second lane of `x` beside the first of `y`.
+#[inline]
+pub(crate) fn crossed<const N: usize>(x: &[Two; N], y: &[Two; N]) -> [Two; N] {
+    firsts(&second(x), y)
+}
+
 #[inline]
 pub(crate) fn swapped<const N: usize>(x: &[Two; N]) -> [Two; N] {
-    firsts(&second(x), x)
+    crossed(x, x)
 }
 
 #[inline]

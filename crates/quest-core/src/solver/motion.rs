@@ -120,7 +120,7 @@ impl Motion {
 
     /// The solution of five constraints that Newton's iteration leads to; `None` where it does not converge.
     pub(crate) fn solution(&self, alignment: &Alignment, matches: &[Correspondence; 5]) -> Option<Self> {
-        let [solution, _] = TwoMotions::same(self).solutions(alignment, matches);
+        let [solution, _] = TwoMotions::new(self, self).solutions(alignment, matches);
         solution
     }
 

@@ -122,8 +122,8 @@ const PRODUCTS: [usize; 10] = {
     places
 };
 
-/// The four products without `s_3` by the six with it, in the least-squares sense of the cubics with weights; `None` where they do not
-/// determine these.
+/// The four products without `s_3` by the six with it, in the least-squares sense of the cubics with weights; `None` where
+/// they do not determine these.
 fn eliminated(cubics: &[Cubic; 10], weights: &[f64; 10]) -> Option<[[f64; 6]; 4]> {
     let mut normal = [[0.0; 10]; 4];
     for (cubic, weight) in cubics.iter().zip(weights) {

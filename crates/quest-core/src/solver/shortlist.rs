@@ -8,7 +8,7 @@ use super::gram::Gram;
 use super::motion::{COARSE, FINE, Motion, Until};
 use super::two_descents;
 use super::two_motions::TwoMotions;
-use crate::algebra::two::{self, Two, TwoQuaternions, TwoVectors};
+use crate::algebra::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
 use crate::structure::{Completed, two_pairs_with_depths, two_with_depths, with_depths};
@@ -253,7 +253,7 @@ impl Shortlist {
                 let second = items.next();
                 let count = 1 + usize::from(second.is_some());
                 let two = [first, second.unwrap_or(first)];
-                let (q_21, direction) = side_by_side(&two.map(|item| item.motion));
+                let TwoMotions { q_21, direction } = TwoMotions::new(&two[0].motion, &two[1].motion);
                 let mut push = |completed: [Completed; 2]| {
                     for (item, completed) in two.iter().zip(completed).take(count) {
                         out.push(candidate(item.kind, &completed));
@@ -270,12 +270,6 @@ impl Shortlist {
         }
         rank(out);
     }
-}
-
-fn side_by_side([first, second]: &[Motion; 2]) -> (TwoQuaternions, TwoVectors) {
-    let (p, q) = (first.q_21.quaternion(), second.q_21.quaternion());
-    let q_21 = [[p.w, q.w], [p.i, q.i], [p.j, q.j], [p.k, q.k]].map(Two::new);
-    (q_21, two::side_by_side(&first.direction, Some(&second.direction)))
 }
 
 fn candidate(kind: CandidateKind, completed: &Completed) -> Candidate {
@@ -330,7 +324,7 @@ pub(crate) fn rank(out: &mut Candidates) {
     let unordered = out.clone();
     let places = out.as_mut_slice();
     for (key, candidate) in keys.iter().zip(unordered.iter()) {
-        // As many comparisons as there are pairs, but none that a branch waits for.
+        // More comparisons than sorting takes, but none that a branch waits for.
         let place: usize = keys.iter().map(|other| usize::from(other < key)).sum();
         places[place] = *candidate;
     }

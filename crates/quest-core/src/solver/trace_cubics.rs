@@ -10,7 +10,7 @@
 //! (Demazure 1988; the form of Nistér, PAMI 2004, equations (4) and (5)). `cubics.rs` has the same variety in a form that
 //! survives a vanishing parallax; this is the one that was published, and eliminated in different ways.
 
-use super::forms::{Cubic, Cubics, Linears, first, firsts, negative, quadratics, second};
+use super::forms::{Cubic, Cubics, Linears, crossed, first, firsts, negative, quadratics, second};
 use crate::algebra::two::Two;
 
 /// Four essential matrices, row by row.
@@ -44,7 +44,7 @@ pub(crate) fn trace_cubics(basis: &Basis) -> [Cubic; 10] {
     out.set(0, [(&p00, &e0), (&p01, &e1), (&p02, &e2)]);
     out.set(1, [(&p01, &e0), (&p11, &e1), (&p12, &e2)]);
     out.set(2, [(&p02, &e0), (&p12, &e1), (&p22, &e2)]);
-    out.set(3, [(&p00_01, &e(2, 2)), (&firsts(&second(&p00_01), &p11_22), &e(5, 5)), (&p02_12, &e(8, 8))]);
+    out.set(3, [(&p00_01, &e(2, 2)), (&crossed(&p00_01, &p11_22), &e(5, 5)), (&p02_12, &e(8, 8))]);
     out.set(
         4,
         [

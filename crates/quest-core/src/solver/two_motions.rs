@@ -3,14 +3,17 @@
 //! Each step of one motion waits for the step before; those of two do not wait for each other. Where one takes a branch, two
 //! compute both sides and select.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::aligned::Alignment;
 use super::essential::decomposed;
 use super::motion::Motion;
 use super::split::{self, Split};
 use crate::Correspondence;
-use crate::algebra::two::{Two, TwoQuaternions, TwoVectors, both, cross, dot, product, rotation, scaled};
+use crate::algebra::two::{
+    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled, side_by_side,
+    unit_quaternions,
+};
 use crate::structure::translation_directions;
 
 /// Newton's iteration takes one or two steps; a double root takes them all.
@@ -22,15 +25,18 @@ const ROUNDING: f64 = 1e-30;
 /// Two relative poses without the length of their translations.
 #[derive(Clone, Copy)]
 pub(crate) struct TwoMotions {
-    q_21: TwoQuaternions,
-    direction: TwoVectors,
+    pub(crate) q_21: TwoQuaternions,
+    pub(crate) direction: TwoVectors,
 }
 
 impl TwoMotions {
-    /// The same motion twice.
-    pub(crate) fn same(motion: &Motion) -> Self {
-        let q = motion.q_21.quaternion();
-        Self { q_21: [q.w, q.i, q.j, q.k].map(Two::splat), direction: both(&motion.direction) }
+    /// Two motions side by side.
+    #[inline]
+    pub(crate) fn new(first: &Motion, second: &Motion) -> Self {
+        Self {
+            q_21: quaternions(&first.q_21, &second.q_21),
+            direction: side_by_side(&first.direction, Some(&second.direction)),
+        }
     }
 
     /// One of the two motions of each essential matrix of any scale, row by row; not finite for a matrix that is zero or not
@@ -135,18 +141,13 @@ fn essential(t: &TwoVectors, r_21: &[TwoVectors; 3]) -> [TwoVectors; 3] {
 /// `q_21 ⊗ q0_21`.
 #[inline]
 pub(crate) fn after(q_21: &TwoQuaternions, q0_21: &UnitQuaternion<f64>) -> TwoQuaternions {
-    let q0 = q0_21.quaternion();
-    product(q_21, &[q0.w, q0.i, q0.j, q0.k].map(Two::splat))
+    product(q_21, &quaternions(q0_21, q0_21))
 }
 
 /// Unit quaternions one by one; `None` for one that is not finite.
 #[inline]
 pub(crate) fn apart(q_21: &TwoQuaternions) -> [Option<UnitQuaternion<f64>>; 2] {
-    let [w, x, y, z] = q_21.map(Two::to_array);
-    std::array::from_fn(|k| {
-        let q_21 = UnitQuaternion::new_unchecked(Quaternion::new(w[k], x[k], y[k], z[k]));
-        q_21.coords.sum().is_finite().then_some(q_21)
-    })
+    unit_quaternions(q_21).map(|q_21| q_21.coords.sum().is_finite().then_some(q_21))
 }
 
 /// A step of Newton's iteration.

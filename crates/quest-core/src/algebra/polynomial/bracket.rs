@@ -10,6 +10,18 @@ use crate::algebra::two::Two;
 struct Bracket {
     low: f64,
     high: f64,
+    /// Whether the polynomial is negative at `low`.
+    negative_below: bool,
+}
+
+impl Bracket {
+    /// `None` where there is no root, rounding having decided a count.
+    #[inline]
+    fn new<const N: usize>(p: &[f64; N], low: f64, high: f64) -> Option<Self> {
+        let [below, above] = value(p, Two::new([low, high])).to_array();
+        let negative_below = below < 0.0;
+        (negative_below != (above < 0.0)).then_some(Self { low, high, negative_below })
+    }
 }
 
 /// The intervals of all roots.
@@ -38,10 +50,13 @@ impl<const N: usize> Brackets<N> {
             return;
         }
         if count < 2.0 {
-            self.push(Bracket { low: from.x, high: to.x });
+            match Bracket::new(&chain.p, from.x, to.x) {
+                Some(bracket) => self.push(bracket),
+                None => self.certain = false,
+            }
         } else if depth == 0 {
             self.certain = false;
-            self.push(Bracket { low: from.x, high: to.x });
+            self.push(Bracket { low: from.x, high: to.x, negative_below: false });
             self.isolate(chain, End { changes: from.changes - 1.0, ..from }, to, depth);
         } else {
             let third = (to.x - from.x) / 3.0;
@@ -58,11 +73,8 @@ impl<const N: usize> Brackets<N> {
     pub(super) fn refined(&self, p: &[f64; N]) -> RealRoots<N> {
         let mut pairs = [TwoBrackets::default(); N];
         let pairs = &mut pairs[..self.len.div_ceil(2)];
-        let mut certain = self.certain;
         for (pair, brackets) in pairs.iter_mut().zip(self.items[..self.len].chunks(2)) {
-            let sound;
-            (*pair, sound) = TwoBrackets::new(p, &brackets[0], &brackets[brackets.len() - 1]);
-            certain &= sound;
+            *pair = TwoBrackets::new(&brackets[0], &brackets[brackets.len() - 1]);
         }
         for _ in 0..MAX_STEPS {
             let mut is_done = true;
@@ -80,7 +92,7 @@ impl<const N: usize> Brackets<N> {
             let roots = pair.x.to_array();
             values.copy_from_slice(&roots[..values.len()]);
         }
-        RealRoots { values, len: self.len, certain, close: false }
+        RealRoots { values, len: self.len, certain: self.certain, close: false }
     }
 }
 
@@ -97,15 +109,18 @@ struct TwoBrackets {
 }
 
 impl TwoBrackets {
-    /// The intervals, and whether there is a root in each: rounding may have decided a count.
     #[inline]
-    fn new<const N: usize>(p: &[f64; N], first: &Bracket, second: &Bracket) -> (Self, bool) {
+    fn new(first: &Bracket, second: &Bracket) -> Self {
         let low = Two::new([first.low, second.low]);
         let high = Two::new([first.high, second.high]);
-        let [positive_below, positive_above] = [low, high].map(|x| value(p, x).simd_ge(Two::ZERO));
-        let x = (low + high) * 0.5;
-        let pair = Self { low, high, x, positive_below, is_found: Two::ZERO };
-        (pair, (positive_below ^ positive_above).all())
+        let sign = [first, second].map(|bracket| if bracket.negative_below { -1.0 } else { 1.0 });
+        Self {
+            low,
+            high,
+            x: (low + high) * 0.5,
+            positive_below: Two::new(sign).simd_gt(Two::ZERO),
+            is_found: Two::ZERO,
+        }
     }
 
     /// A step of each that is not found already. Whether both are then.
