@@ -19,8 +19,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// The 95 % quantile of χ² with five degrees of freedom.
+/// The 95 % quantiles of χ² with five and six degrees of freedom.
 const CHI_SQUARE_5: f64 = 11.070_5;
+const CHI_SQUARE_6: f64 = 12.591_6;
+
+/// 95 % of a normal variable is within so many standard deviations.
+const NORMAL_95: f64 = 1.96;
 
 /// Estimates against the truth.
 #[derive(Debug, Parser)]
@@ -109,7 +113,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Arguments {
-    /// `f` of every scene of a row, with a share of false matches, and its estimate.
+    /// `f` of every scene of a row, with a share of false matches, and its estimate. The mean depth of the true matches is one.
     fn estimates<T: Send>(
         &self,
         scene: &SceneOptions,
@@ -118,9 +122,10 @@ impl Arguments {
     ) -> Result<Vec<T>, SceneError> {
         parallel::map(self.scenes, self.threads, |index| {
             let mut scene = Scene::generate(scene, self.seed, index)?;
-            scene
+            let is_true = scene
                 .add_outliers(outliers, self.seed, index)
                 .map_err(|source| SceneError::from(quest_core::InputError::Match { index: 0, source }))?;
+            scale_by_true(&mut scene, &is_true)?;
             let found = robust::estimate(&scene.matches, &options()).ok();
             Ok(f(index, &scene, found))
         })
@@ -212,8 +217,8 @@ impl Arguments {
         for outliers in [0.0, 0.3] {
             for parallax in [0.003, 0.01, 0.03, 0.1, 0.3] {
                 let scene = SceneOptions { motion: Motion::Parallax(parallax), ..noisy(100) };
-                let all = self.estimates(&scene, outliers, |_, _, found| {
-                    found.map(|found| (found.model, found.pose.t_21.norm() / parallax - 1.0))
+                let all = self.estimates(&scene, outliers, |_, scene, found| {
+                    found.map(|found| (found.model, found.pose.t_21.norm() / scene.truth.t_21.norm() - 1.0))
                 })?;
                 let moved = || all.iter().flatten().filter(|e| e.0 != Model::PureRotation).map(|e| e.1);
                 println!(
@@ -230,24 +235,46 @@ impl Arguments {
     }
 
     fn covariance(&self) -> Result<(), SceneError> {
-        println!("0.5 px, general scenes: rotation and direction of translation, five degrees of freedom\n");
-        println!("| matches | outliers | mean NEES/5 | median NEES | in the 95 % region |");
-        println!("|---|---|---|---|---|");
+        println!(
+            "0.5 px: rotation and direction of translation, five degrees of freedom, and the length of translation\n"
+        );
+        println!(
+            "| motion | matches | outliers | mean NEES/5 | median NEES | in the 95 % region | in that of all six | \
+             length within 1.96 σ | σ of the length, median |"
+        );
+        println!("|---|---|---|---|---|---|---|---|---|");
         for outliers in [0.0, 0.3, 0.5] {
             for points in [50, 100, 200, 500, 1_000] {
-                let all = self.estimates(&noisy(points), outliers, |_, scene, found| {
-                    found.filter(|found| found.model == Model::General).and_then(|found| nees(scene, &found))
-                })?;
-                let found: Vec<f64> = all.into_iter().flatten().collect();
-                println!(
-                    "| {points} | {:.0} % | {:.3} | {:.2} | {:.1} % |",
-                    100.0 * outliers,
-                    mean(found.iter().copied()) / 5.0,
-                    median(found.iter().copied()),
-                    share(&found, |x| *x < CHI_SQUARE_5),
-                );
+                self.covariance_row("general", &noisy(points), outliers)?;
+            }
+            for parallax in [0.01, 0.03, 0.1] {
+                let scene = SceneOptions { motion: Motion::Parallax(parallax), ..noisy(100) };
+                self.covariance_row(&format!("parallax {parallax}"), &scene, outliers)?;
             }
         }
+        Ok(())
+    }
+
+    fn covariance_row(&self, name: &str, scene: &SceneOptions, outliers: f64) -> Result<(), SceneError> {
+        let all = self.estimates(scene, outliers, |_, scene, found| {
+            let found = found.filter(|found| found.model == Model::General)?;
+            let deviation = deviation_of_length(&found);
+            let error = found.pose.t_21.norm() - scene.truth.t_21.norm();
+            let [of_five, of_six] = nees(scene, &found)?;
+            Some((of_five, of_six, error / deviation, deviation / scene.truth.t_21.norm()))
+        })?;
+        let found: Vec<_> = all.into_iter().flatten().collect();
+        println!(
+            "| {name} | {} | {:.0} % | {:.3} | {:.2} | {:.1} % | {:.1} % | {:.1} % | {:.1} % |",
+            scene.points,
+            100.0 * outliers,
+            mean(found.iter().map(|e| e.0)) / 5.0,
+            median(found.iter().map(|e| e.0)),
+            share(&found, |e| e.0 < CHI_SQUARE_5),
+            share(&found, |e| e.1 < CHI_SQUARE_6),
+            share(&found, |e| e.2.abs() < NORMAL_95),
+            100.0 * median(found.iter().map(|e| e.3)),
+        );
         Ok(())
     }
 
@@ -288,6 +315,19 @@ impl Arguments {
     }
 }
 
+/// Makes the mean depth of the true matches one: a false match has no depth.
+fn scale_by_true(scene: &mut Scene, is_true: &[bool]) -> Result<(), SceneError> {
+    let true_points: Vec<_> =
+        scene.points1.iter().zip(is_true).filter(|(_, is_true)| **is_true).map(|(x1, _)| *x1).collect();
+    if !true_points.is_empty() {
+        let scaled = Scene::from_points(scene.truth, true_points.clone())?;
+        let scale = scaled.points1[0].z / true_points[0].z;
+        scene.truth = scaled.truth;
+        scene.points1.iter_mut().for_each(|x1| *x1 *= scale);
+    }
+    Ok(())
+}
+
 /// The points of a scene as a third camera sees them, matched with their images in view 1.
 fn third_view(scene: &Scene, options: &SceneOptions, seed: u64, index: u64) -> Option<Vec<Correspondence>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -310,8 +350,8 @@ fn third_view(scene: &Scene, options: &SceneOptions, seed: u64, index: u64) -> O
     })
 }
 
-/// The squared error of rotation and direction of translation in the metric of the covariance.
-fn nees(scene: &Scene, found: &Estimate) -> Option<f64> {
+/// The squared errors of rotation and direction of translation, and of rotation and translation, in the metric of the covariance.
+fn nees(scene: &Scene, found: &Estimate) -> Option<[f64; 2]> {
     let t = found.pose.t_21;
     let direction = t.try_normalize(0.0)?;
     let across =
@@ -319,14 +359,23 @@ fn nees(scene: &Scene, found: &Estimate) -> Option<f64> {
     let tangent = [across, direction.cross(&across)];
     // The truth is exp([ω]×) R.
     let rotation = (scene.truth.q_21 * found.pose.q_21.inverse()).scaled_axis();
-    let moved = scene.truth.t_21.normalize() - direction;
-    let error =
-        SVector::<f64, 5>::from_fn(|k, _| if k < 3 { rotation[k] } else { moved.dot(&tangent[k - 3]) });
+    let turned = scene.truth.t_21.normalize() - direction;
+    let of_five =
+        SVector::<f64, 5>::from_fn(|k, _| if k < 3 { rotation[k] } else { turned.dot(&tangent[k - 3]) });
+    let moved = scene.truth.t_21 - t;
+    let of_six = SVector::<f64, 6>::from_fn(|k, _| if k < 3 { rotation[k] } else { moved[k - 3] });
     let mut project = SMatrix::<f64, 5, 6>::zeros();
     project.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
     for (k, tangent) in tangent.iter().enumerate() {
         project.fixed_view_mut::<1, 3>(3 + k, 3).copy_from(&(tangent.transpose() / t.norm()));
     }
-    let covariance = project * found.covariance * project.transpose();
-    Some(error.dot(&covariance.cholesky()?.solve(&error)))
+    let five = project * found.covariance * project.transpose();
+    let six = found.covariance;
+    Some([of_five.dot(&five.cholesky()?.solve(&of_five)), of_six.dot(&six.cholesky()?.solve(&of_six))])
+}
+
+/// The standard deviation of the length of the translation.
+fn deviation_of_length(found: &Estimate) -> f64 {
+    let direction = found.pose.t_21.normalize();
+    (direction.transpose() * found.covariance.fixed_view::<3, 3>(3, 3) * direction).x.sqrt()
 }

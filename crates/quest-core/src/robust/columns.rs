@@ -5,7 +5,7 @@
 //! match only has to look the same way in both views. Without this a vote rejects the true rotation of a camera that
 //! hardly moves.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::observations::Image;
 use super::widest::{Work, widest};
@@ -45,7 +45,18 @@ impl Look {
 }
 
 impl Columns {
-    pub(super) fn new(images: [Image; 2], all: [Vec<f64>; 6]) -> Self {
+    /// The points of matches, on the plane `z = 1` or on the unit sphere.
+    pub(super) fn of_points(
+        images: [Image; 2],
+        points: impl ExactSizeIterator<Item = [Vector3<f64>; 2]>,
+    ) -> Self {
+        let mut all: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(points.len()));
+        for [x1, x2] in points {
+            let (x1, x2) = (images[0].scaled(&x1), images[1].scaled(&x2));
+            for (column, x) in all.iter_mut().zip(x1.iter().chain(x2.iter())) {
+                column.push(*x);
+            }
+        }
         Self { images, all }
     }
 
@@ -60,6 +71,13 @@ impl Columns {
     /// The two views, both planes or both spheres.
     pub(super) fn images(&self) -> [Image; 2] {
         self.images
+    }
+
+    /// The points of a match on the plane `z = 1`, or on the unit sphere.
+    pub(super) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
+        let [x1, y1, z1, x2, y2, z2] = self.all.each_ref().map(|column| column[index]);
+        let [d1, d2] = self.inverse_scales().map(Vector3::from);
+        [Vector3::new(x1, y1, z1).component_mul(&d1), Vector3::new(x2, y2, z2).component_mul(&d2)]
     }
 
     pub(super) fn is_sphere(&self) -> bool {

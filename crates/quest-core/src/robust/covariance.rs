@@ -1,84 +1,106 @@
 //! The covariance of a pose, from the normal equations of its last refinement.
 //!
 //! It is `(E[ψ²] H⁻¹ + H⁻¹ S H⁻¹) / E[ψ']²` with `H = Σ J Jᵀ` over the inliers and `ψ` the influence of a residual under the
-//! last refinement's loss, the means being those of normal noise as large as the inliers show. `S` is what false matches
-//! that happen to agree with the pose pull at it: as many as there are outliers are expected to have `S = Σ ψ² J Jᵀ`, which is
-//! measured on false matches (see [`significance`](super::significance)). For few inliers there is a factor close to one
-//! (P. J. Huber, *Robust statistics*, 1981, section 7.6).
+//! last refinement's loss, the means being those of normal noise as large as the inliers show. For few inliers there is a factor
+//! close to one (P. J. Huber, *Robust statistics*, 1981, section 7.6).
+//!
+//! `∂r/∂t` is proportional to the inverse depth. Where a match has hardly moved, as near the epipole of a camera that goes
+//! forward, what was measured of that is noise, which adds to the square: one such match may outweigh all others. So `H` is the
+//! mean over what the inverse depths may be, given what was measured of them and of the others.
+//!
+//! `S` is what false matches that happen to agree with the pose pull at it. As many as there are outliers are expected to have
+//! `S = Σ ψ² J Jᵀ / (1 + h)`, which is measured on false matches (see [`significance`](super::significance)). A match with the
+//! leverage `h = ψ/r Jᵀ H⁻¹ J` turns the pose `1 + h` times less than one without, but agrees up to `√(1 + h)` times as far away
+//! as soon as it is fitted: `√(1 + h)` if all of those stay, `(1 + h)²` if none do; some are [doubted](super::doubt).
+//!
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
-use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion, Vector5};
+use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion};
 
 use super::columns::Columns;
-use super::length::{Length, length};
-use super::loss::{SquaredInfluence, Truncated};
+use super::inverse_depth::{InverseDepth, Usual};
+use super::length::Length;
+use super::loss::{Loss, Truncated};
 use super::observations::Observations;
 use super::polish::Polished;
+use super::pose_score::Scored;
 use super::refine::Subset;
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
-use crate::solver::motion::Motion;
 
-/// Steps of the numerical derivatives of the length, in radians.
-const STEP: f64 = 1e-5;
+/// Inliers, at most, that the normal equations are summed over.
+const ENOUGH: usize = 2_000;
 
-/// Matches that the derivatives of the length are taken over.
-const ENOUGH: usize = 100;
+const LEAST_SQUARES: Truncated = Truncated { square_limit: f64::INFINITY };
 
 /// The covariance of the five parameters of a motion.
 fn of_motion(
     observations: &Observations,
-    motion: &Motion,
     inliers: &[u32],
     polished: &Polished,
     false_matches: &Columns,
 ) -> Option<Matrix5<f64>> {
-    let subset = Subset::new(&observations.columns, inliers);
-    let equations = subset.equations(motion, &Truncated::new(f64::INFINITY));
-    let inverse = equations.hessian.cholesky()?.inverse();
-    let outliers = (observations.len() - inliers.len()) as f64;
-    let mut pull = Matrix5::zeros();
-    if outliers > 0.0 {
-        pull = pull_of_a_match(false_matches, motion, polished) * outliers;
-    }
+    let some = &inliers[..inliers.len().min(ENOUGH)];
+    let share = inliers.len() as f64 / some.len() as f64;
+    let motion = &polished.scored.motion;
+    let points = probable_points(observations, some, polished);
+    let indices: Vec<u32> = (0..).take(points.len()).collect();
+    let hessian = Subset::new(&points, &indices).equations(motion, &LEAST_SQUARES).hessian * (0.5 * share);
+    let inverse = hessian.cholesky()?.inverse();
     let normal = polished.loss.of_normal(polished.sigma);
+    let mut pull = Matrix5::zeros();
+    let outliers = (observations.len() - inliers.len()) as f64;
+    if outliers > 0.0 {
+        pull = pull_of_a_match(false_matches, polished, &inverse) * outliers;
+    }
     let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
     let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
     Some((inverse * normal.square + inverse * pull * inverse) * (few * few))
 }
 
-/// The mean of `ψ² J Jᵀ` over false matches, most of which are too far off to count.
-fn pull_of_a_match(false_matches: &Columns, motion: &Motion, polished: &Polished) -> Matrix5<f64> {
-    let subset = Subset::new(false_matches, &false_matches.agreeing(motion, polished.limit));
-    let influence = SquaredInfluence(polished.loss);
-    subset.equations(motion, &influence).hessian / false_matches.len().max(1) as f64
+/// The inliers, exactly as the motion sees them, with inverse depths one standard deviation before and behind what they most
+/// probably are: of both together the mean and the square are right.
+fn probable_points(observations: &Observations, inliers: &[u32], polished: &Polished) -> Columns {
+    let motion = &polished.scored.motion;
+    let depths = InverseDepth::all(&observations.columns, motion, inliers);
+    let usual = Usual::new(&depths);
+    let points = (0..2 * depths.len()).map(|k| {
+        let depth = &depths[k / 2];
+        let [mean, deviation] = usual.given(depth, polished.sigma);
+        let rho = if k % 2 == 0 { mean + deviation } else { mean - deviation };
+        [depth.x1, motion.q_21 * depth.x1 + motion.direction * rho]
+    });
+    Columns::of_points(observations.columns.images(), points)
+}
+
+/// The mean of `ψ² J Jᵀ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
+fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matrix5<f64>) -> Matrix5<f64> {
+    let Polished { scored: Scored { motion, .. }, loss, limit, .. } = polished;
+    let mut sum = Matrix5::zeros();
+    for index in false_matches.agreeing(motion, *limit) {
+        let own = Subset::new(false_matches, &[index]).equations(motion, &LEAST_SQUARES);
+        let weight = loss.cost_and_weight(own.cost).1;
+        let leverage = weight * (inverse * own.hessian).trace();
+        sum += own.hessian * (own.cost * weight * weight / (1.0 + leverage));
+    }
+    sum / false_matches.len().max(1) as f64
 }
 
 /// The covariance of `(ω, t_21)` of a motion whose translation has this length.
 pub(super) fn of_pose(
     observations: &Observations,
-    motion: &Motion,
     inliers: &[u32],
     polished: &Polished,
     size: Length,
     false_matches: &Columns,
 ) -> Option<Matrix6<f64>> {
-    let five = of_motion(observations, motion, inliers, polished, false_matches)?;
+    let five = of_motion(observations, inliers, polished, false_matches)?;
+    let motion = &polished.scored.motion;
     let tangent = tangent_basis(&motion.direction);
-    // The derivatives of the length hardly need all of the matches.
-    let some = &inliers[..inliers.len().min(ENOUGH)];
-    let at =
-        |steps: &[f64; 5]| length(observations, &motion.stepped(&tangent, steps), some, polished.sigma).value;
-    let here = at(&[0.0; 5]);
-    let slope = Vector5::from_fn(|k, _| {
-        let mut steps = [0.0; 5];
-        steps[k] = STEP;
-        (at(&steps) - here) / STEP
-    });
     let mut jacobian = SMatrix::<f64, 6, 5>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
     for k in 0..5 {
-        let mut column = motion.direction * slope[k];
+        let mut column = motion.direction * size.slope[k];
         if k >= 3 {
             column += tangent[k - 3] * size.value;
         }
@@ -108,4 +130,58 @@ pub(super) fn of_rotation(
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
     Some(covariance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Correspondence;
+    use crate::lanes::Loss as Score;
+    use crate::robust::loss::HeavyTailed;
+    use crate::robust::pose_score::PoseScorer;
+    use crate::robust::significance;
+    use crate::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
+    use crate::solver::motion::Motion;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// The determinant of the covariance of the direction, by the covariance and by the normal equations alone.
+    fn variances(matches: &[Correspondence], motion: Motion) -> [f64; 2] {
+        let order = (0..matches.len()).collect();
+        let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2]);
+        let mut poses = PoseScorer::new(&observations, 1.5, Score::default());
+        let scored = poses.score(motion, 1.5);
+        assert_eq!(poses.inliers.len(), matches.len());
+        let polished = Polished { scored, sigma: 0.5, loss: HeavyTailed::new(2.5), limit: 4.5 };
+        let false_matches = significance::false_matches(&observations);
+        let five = of_motion(&observations, &poses.inliers, &polished, &false_matches).unwrap();
+        let subset = Subset::new(&observations.columns, &poses.inliers);
+        let plain = subset.equations(&motion, &LEAST_SQUARES).hessian.cholesky().unwrap().inverse() * 0.25;
+        [five, plain].map(|c| c.fixed_view::<2, 2>(3, 3).determinant())
+    }
+
+    #[test]
+    fn a_match_at_the_epipole_says_nothing() {
+        let options = SceneOptions { points: 100, ..SceneOptions::realistic() };
+        let mut scene = Scene::generate(&options, 78, 0).unwrap();
+        // Forward, by a hundredth of the depth.
+        scene.truth.q_21 = UnitQuaternion::identity();
+        scene.truth.t_21 = Vector3::new(0.0, 0.0, -0.01);
+        let points: Vec<_> =
+            scene.points1.iter().map(|x| [x, &(x + scene.truth.t_21)].map(|x| x.xy() / x.z)).collect();
+        let mut matches: Vec<_> = points
+            .iter()
+            .map(|[a, b]| Correspondence::from_image_points([a.x, a.y], [b.x, b.y]).unwrap())
+            .collect();
+        let motion = Motion { q_21: scene.truth.q_21, direction: -Vector3::z() };
+        let [without, plain_without] = variances(&matches, motion);
+        // Of points as they are seen the two agree, but for the loss and the spread of depths.
+        assert!((without / plain_without - 1.0).abs() < 0.2, "{without} {plain_without}");
+        // One pixel away from the epipole, and turned to be 0.2 pixels away by its noise: as if it were very near.
+        let pixel = 1.0 / FOCAL_LENGTH;
+        matches.push(Correspondence::from_image_points([pixel, 0.0], [0.2 * pixel, 0.0]).unwrap());
+        let [with, plain_with] = variances(&matches, motion);
+        assert!(plain_with < 0.01 * plain_without, "{plain_with} {plain_without}");
+        // One match of a hundred more, and where most inverse depths are has moved by one match.
+        assert!((with / without - 1.0).abs() < 0.5, "{with} {without}");
+    }
 }

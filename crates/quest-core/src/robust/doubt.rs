@@ -12,14 +12,13 @@
 //! `A` is the area over which the points of view 2, false ones too, are spread. `h` is the leverage `Jᵀ H⁻¹ J` of the match:
 //! a pose fitted without it has the residual `r / (1 − h)`, with the variance `σ² / (1 − h)`; `c` is the scale of the loss. `ρ` is
 //! the inverse depth, `w` its precision at unit noise; `2 √w dr dρ` is an element of the area. Of the inverse depths all
-//! that is known is where most of them are, `m ± γ`, and that few points are near, as if all were spread evenly over a ground:
-//! `p(z) ∝ z` of the depth makes a tail `p(ρ) ∝ ρ⁻³`, and `p(ρ) = 3√3 / (4π γ (1 + u³))` with `u = |ρ − m| / γ`.
+//! that is known is where most of them are, `m ± γ`, and that few points are near ([`Usual`]).
 
 use std::f64::consts::PI;
 
+use super::inverse_depth::{InverseDepth, Usual};
 use super::loss::{Loss, Truncated};
 use super::observations::Observations;
-use super::plane::{InverseDepth, inverse_depth};
 use super::polish::{FEWEST, Polished, sigma};
 use super::pose_score::PoseScorer;
 use super::refine::{FINE, Subset, refine};
@@ -31,10 +30,6 @@ const ROUNDS: usize = 3;
 
 /// Steps of a refinement.
 const STEPS: usize = 10;
-
-/// The share, in per cent, of the inverse depths that are within `γ` of their median `m`. Real scenes have a foreground: half of
-/// them, as for a median deviation, may be one wall.
-const MOST: usize = 90;
 
 /// Depths within this multiple of `γ` are usual.
 const USUAL: f64 = 3.0;
@@ -71,7 +66,7 @@ pub(super) fn refine_without_chance(poses: &mut PoseScorer, polished: &mut Polis
 
 /// The inliers that are more likely false than true.
 fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polished: &Polished) -> Vec<u32> {
-    let depths: Vec<_> = inliers.iter().map(|&i| inverse_depth(observations, motion, i as usize)).collect();
+    let depths = InverseDepth::all(&observations.columns, motion, inliers);
     let (sigma, loss) = (polished.sigma, polished.loss);
     let usual = Usual::new(&depths);
     let unusual = |depth: &InverseDepth| usual.distance(depth, sigma) > USUAL;
@@ -96,40 +91,6 @@ fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polis
         prior * area * across * along < 1.0
     };
     candidates.filter(is_doubtful).map(|(&index, _)| index).collect()
-}
-
-/// Where most inverse depths are.
-struct Usual {
-    median: f64,
-    reach: f64,
-}
-
-impl Usual {
-    /// Of one depth at least.
-    fn new(depths: &[InverseDepth]) -> Self {
-        let quantile = |mut values: Vec<f64>, percent: usize| {
-            let index = (values.len() - 1) * percent / 100;
-            *values.select_nth_unstable_by(index, f64::total_cmp).1
-        };
-        let median = quantile(depths.iter().map(|d| d.value).collect(), 50);
-        let reach = quantile(depths.iter().map(|d| (d.value - median).abs()).collect(), MOST);
-        Self { median, reach }
-    }
-
-    /// `γ`, not less than what the noise of this depth alone would make it.
-    fn scale(&self, depth: &InverseDepth, sigma: f64) -> f64 {
-        self.reach.max(sigma / depth.precision.sqrt())
-    }
-
-    /// `u`.
-    fn distance(&self, depth: &InverseDepth, sigma: f64) -> f64 {
-        (depth.value - self.median).abs() / self.scale(depth, sigma)
-    }
-
-    fn density(&self, depth: &InverseDepth, sigma: f64) -> f64 {
-        let norm = 0.75 * 3.0_f64.sqrt() / PI;
-        norm / (self.scale(depth, sigma) * (1.0 + self.distance(depth, sigma).powi(3)))
-    }
 }
 
 #[cfg(test)]

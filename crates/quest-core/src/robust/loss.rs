@@ -40,10 +40,6 @@ pub(super) struct NormalMeans {
     pub(super) square_slope: f64,
 }
 
-/// For sums over matches of `ψ² J Jᵀ` in place of a loss, with `ψ` the influence of a residual under [`HeavyTailed`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SquaredInfluence(pub(super) HeavyTailed);
-
 /// `r² / (1 + r²/c²)`: the loss of Geman and `McClure`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GemanMcClure {
@@ -121,14 +117,6 @@ impl Loss for HeavyTailed {
         let share = 1.0 / (1.0 + square * self.inverse_square);
         let root = share.sqrt();
         (2.0 * (1.0 - root) / self.inverse_square, share * root)
-    }
-}
-
-impl Loss for SquaredInfluence {
-    #[inline(always)]
-    fn cost_and_weight(&self, square: f64) -> (f64, f64) {
-        let (_, weight) = self.0.cost_and_weight(square);
-        (0.0, square * weight * weight)
     }
 }
 

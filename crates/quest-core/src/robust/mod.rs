@@ -22,7 +22,7 @@
 //! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`plane`). The best is refined once
 //!    more without the matches that agree with it by chance (`doubt`).
 //! 5. Whether chance explains the inliers (`significance`), and which model they support (`model`).
-//! 6. The length of the translation and the covariance (`length`, `covariance`).
+//! 6. The length of the translation and the covariance (`inverse_depth`, `length`, `covariance`).
 //!
 //! # Noise
 //! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
@@ -38,6 +38,7 @@ mod covariance;
 mod doubt;
 mod estimate;
 mod framed;
+mod inverse_depth;
 mod length;
 mod loss;
 mod model;

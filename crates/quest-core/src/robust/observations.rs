@@ -68,15 +68,9 @@ impl Observations {
         });
         let images = focal_lengths
             .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
-        let mut columns: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(matches.len()));
-        for m in &matches {
-            let x1 = images[0].scaled(m.bearing1());
-            let x2 = images[1].scaled(m.bearing2());
-            for (column, x) in columns.iter_mut().zip(x1.iter().chain(x2.iter())) {
-                column.push(*x);
-            }
-        }
-        Self { matches, order, columns: Columns::new(images, columns) }
+        let points = matches.iter().map(|m| [*m.bearing1(), *m.bearing2()]);
+        let columns = Columns::of_points(images, points);
+        Self { matches, order, columns }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -99,11 +93,6 @@ impl Observations {
         nearly_on_a_line(some, images.map(|image| threshold / image.square_focal_length().sqrt()))
     }
 
-    /// The squared angle, in radians, that a pixel in both views stands for.
-    pub(super) fn square_angle_of_pixel(&self) -> f64 {
-        self.columns.square_angle_of_pixel()
-    }
-
     /// The area of view 2, in square pixels, over which its points are spread: that of a rectangle, evenly filled, with
     /// their second moments.
     pub(super) fn area_of_view2(&self) -> f64 {
@@ -117,18 +106,11 @@ impl Observations {
         12.0 * square.max(0.0).sqrt()
     }
 
-    /// A match as vectors on the planes `z = 1`, or as unit bearings.
-    pub(super) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
-        let m = &self.matches[index];
-        let (a, b) = (m.bearing1(), m.bearing2());
-        if self.is_sphere() { [*a, *b] } else { [a / a.z, b / b.z] }
-    }
-
     /// Some of the matches with the frames of both views.
     pub(super) fn framed(&self, indices: &[u32]) -> Framed {
         let [image1, image2] = self.columns.images();
         let framed = |&index: &u32| {
-            let [x1, x2] = self.vectors(index as usize);
+            let [x1, x2] = self.columns.vectors(index as usize);
             FramedMatch { x1, x2, frame1: image1.frame(&x1), frame2: image2.frame(&x2) }
         };
         Framed::new(&indices.iter().map(framed).collect::<Vec<_>>())
@@ -136,7 +118,7 @@ impl Observations {
 }
 
 impl Image {
-    fn scaled(self, b: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn scaled(self, b: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Plane([fx, fy]) => Vector3::new(fx * b.x / b.z, fy * b.y / b.z, 1.0),
             Self::Sphere(f) => b * f,

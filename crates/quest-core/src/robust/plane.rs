@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::inverse_depth::InverseDepth;
 use super::loss::GemanMcClure;
 use super::observations::Observations;
 use super::polish::SCALE;
@@ -40,25 +41,6 @@ pub(super) struct Plane {
     pub(super) motions: [Option<Motion>; 2],
 }
 
-/// The inverse depth of a match in view 1, its translation having length one, and the inverse of its variance at unit
-/// noise.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct InverseDepth {
-    pub(super) x1: Vector3<f64>,
-    pub(super) value: f64,
-    pub(super) precision: f64,
-}
-
-/// The signed inverse depth `ρ = −(x2 × t) · (x2 × R x1) / |x2 × t|²` of a match in view 1.
-pub(super) fn inverse_depth(observations: &Observations, motion: &Motion, index: usize) -> InverseDepth {
-    let [x1, x2] = observations.vectors(index);
-    let across = x2.cross(&motion.direction);
-    let square = across.norm_squared().max(1e-18);
-    let value = -across.dot(&x2.cross(&(motion.q_21 * x1))) / square;
-    let precision = square / (x2.norm_squared() * observations.square_angle_of_pixel());
-    InverseDepth { x1, value, precision }
-}
-
 /// Fits a plane to the inliers of a motion, `sigma` their noise in pixels.
 pub(super) fn fit(
     observations: &Observations,
@@ -68,7 +50,7 @@ pub(super) fn fit(
     rng: &mut ChaCha8Rng,
 ) -> Option<Plane> {
     let judges = &inliers[..inliers.len().min(JUDGES)];
-    let depths: Vec<_> = judges.iter().map(|&i| inverse_depth(observations, motion, i as usize)).collect();
+    let depths = InverseDepth::all(&observations.columns, motion, judges);
     let g = most_common_plane(&depths, CAP * sigma * sigma, rng)?;
     let mut homography = motion.q_21.to_rotation_matrix().into_inner() + motion.direction * g.transpose();
     Some(refined(observations, judges, &mut homography, sigma))

@@ -65,7 +65,7 @@ impl<'a> Scorer<'a> {
                 columns.push((*m.bearing1()).into(), (*m.bearing2()).into());
             }
             // One angle for both views: an exact weight would have to know which view a residual comes from.
-            let angle = (0.5 * observations.square_angle_of_pixel()).sqrt();
+            let angle = (0.5 * observations.columns.square_angle_of_pixel()).sqrt();
             let (columns, reach) = (Columns::Sphere(columns), reach * angle);
             return Self { observations, kernel, loss, columns, reach };
         }

@@ -8,7 +8,7 @@ use super::columns::Columns;
 use super::covariance;
 use super::doubt::refine_without_chance;
 use super::estimate::{Estimate, Model, RunnerUp};
-use super::length::{Length, length};
+use super::length::{Length, Noise, length};
 use super::loss::GemanMcClure;
 use super::model::{Verdict, choose};
 use super::observations::Observations;
@@ -179,6 +179,7 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         std::mem::swap(&mut motion, second);
     }
     let scored = poses.score(motion, poses.threshold);
+    let polished = Polished { scored, ..polished };
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold).powi(2);
@@ -186,10 +187,11 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         poses.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
     }
     let inliers = poses.inliers.clone();
-    let size = length(observations, &motion, &inliers, sigma);
+    let noise = Noise { sigma, threshold: poses.threshold, false_matches };
+    let size = length(observations, &motion, &inliers, &noise);
     let covariance = match model {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
-        _ => covariance::of_pose(observations, &motion, &inliers, &polished, size, false_matches),
+        _ => covariance::of_pose(observations, &inliers, &polished, size, false_matches),
     }?;
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {
@@ -203,7 +205,7 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         inliers: mask,
         score: share(&scored, observations),
         iterations,
-        runner_up: second.map(|motion| runner_up(poses, motion, sigma)),
+        runner_up: second.map(|motion| runner_up(poses, motion, &noise)),
         evidence: verdict.evidence,
         noise_px: sigma,
     })
@@ -271,9 +273,9 @@ fn second_of_few(all: &[Scored], best: &Motion) -> Option<Motion> {
     different.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|s| s.motion)
 }
 
-fn runner_up(poses: &mut PoseScorer, motion: Motion, sigma: f64) -> RunnerUp {
+fn runner_up(poses: &mut PoseScorer, motion: Motion, noise: &Noise) -> RunnerUp {
     let scored = poses.score(motion, poses.threshold);
-    let size = length(poses.observations, &scored.motion, &poses.inliers, sigma);
+    let size = length(poses.observations, &scored.motion, &poses.inliers, noise);
     RunnerUp {
         pose: with_length(&scored.motion, size),
         score: share(&scored, poses.observations),
