@@ -34,7 +34,7 @@ pub(super) struct Look {
     /// The signed Sampson error of every match in pixels.
     pub(super) residuals: Vec<f64>,
     /// Bit `k` of a match: its point may be in front of both cameras in pose `k` of [`POSES`].
-    sides: Vec<u32>,
+    pub(super) sides: Vec<u32>,
 }
 
 impl Look {

@@ -81,12 +81,6 @@ impl Observations {
         self.columns.is_sphere()
     }
 
-    /// `F = D2 E D1`, of unit norm.
-    pub(super) fn fundamental(&self, e: &Matrix3<f64>) -> Matrix3<f64> {
-        let [d1, d2] = self.columns.inverse_scales();
-        Matrix3::from_fn(|i, j| d2[i] * e[(i, j)] * d1[j]).normalize()
-    }
-
     /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
     pub(super) fn is_line(&self, some: &[Correspondence], threshold: f64) -> bool {
         let images = self.columns.images();

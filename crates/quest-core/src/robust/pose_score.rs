@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use super::columns::{Look, POSES};
 use super::observations::Observations;
 use super::score::{MANY, REACH, cost};
+use super::widest::{Work, widest};
 use crate::lanes::Loss;
 use crate::solver::essential::decompose;
 use crate::solver::motion::Motion;
@@ -12,6 +13,9 @@ use crate::solver::motion::Motion;
 /// The stopping rule counts matches up to this multiple of the threshold: counted at the threshold itself a pose that is
 /// not refined to the end looks worse than it is, and the search goes on for nothing.
 const SUPPORT: f64 = 1.5;
+
+/// Matches side by side.
+const WIDTH: usize = 8;
 
 /// Enough votes to tell four poses apart.
 const MAX_VOTES: usize = 256;
@@ -90,20 +94,74 @@ impl<'a> PoseScorer<'a> {
     /// The score of a pose of the motion that was looked at, `motion` itself.
     fn finish(&mut self, motion: Motion, pose: usize, limit: f64) -> Scored {
         let reach = REACH * self.threshold;
-        let judged = limit.max(reach);
-        let count = self.look.residuals.len();
-        let (mut sum, mut support, mut found) = (0.0, 0, 0);
-        self.inliers.resize(count, 0);
+        let judging = Judging {
+            look: &self.look,
+            pose,
+            loss: self.loss,
+            inverse_reach: 1.0 / reach,
+            judged: limit.max(reach),
+            near: SUPPORT * self.threshold,
+        };
+        let (cost, support) = widest(judging);
+        self.inliers.resize(self.look.residuals.len(), 0);
+        let mut found = 0;
         for (i, (index, r)) in (0_u32..).zip(&self.look.residuals).enumerate() {
-            let r = r.abs();
-            let is_in_front = self.look.is_in_front(i, pose);
-            sum += if r < judged && !is_in_front { 1.0 } else { cost(self.loss, r / reach) };
-            support += usize::from(is_in_front && r < SUPPORT * self.threshold);
             // Written in any case, which takes less time than to ask.
             self.inliers[found] = index;
-            found += usize::from(is_in_front && r < limit);
+            found += usize::from(self.look.is_in_front(i, pose) & (r.abs() < limit));
         }
         self.inliers.truncate(found);
-        Scored { motion, cost: sum, support }
+        Scored { motion, cost, support }
+    }
+}
+
+/// Sums the loss of a pose, and counts its support.
+struct Judging<'a> {
+    look: &'a Look,
+    pose: usize,
+    loss: Loss,
+    inverse_reach: f64,
+    /// Matches behind a camera that are closer than this cost as much as outliers.
+    judged: f64,
+    near: f64,
+}
+
+impl Work for Judging<'_> {
+    type Output = (f64, usize);
+
+    #[inline(always)]
+    fn run(self) -> (f64, usize) {
+        match self.loss {
+            Loss::Truncated => self.sum(|u| cost(Loss::Truncated, u)),
+            Loss::Marginalised => self.sum(|u| cost(Loss::Marginalised, u)),
+        }
+    }
+}
+
+impl Judging<'_> {
+    #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
+    fn sum(self, cost: impl Fn(f64) -> f64) -> (f64, usize) {
+        let Self { look, pose, inverse_reach, judged, near, .. } = self;
+        let (mut sum, mut support) = ([0.0; WIDTH], [0.0; WIDTH]);
+        let (residuals, last_residuals) = look.residuals.as_chunks::<WIDTH>();
+        let (sides, last_sides) = look.sides.as_chunks::<WIDTH>();
+        let mut add = |j: usize, r: f64, sides: u32| {
+            let (r, is_in_front) = (r.abs(), sides >> pose & 1 != 0);
+            let loss = cost(r * inverse_reach);
+            sum[j] += if (r < judged) & !is_in_front { 1.0 } else { loss };
+            support[j] += if is_in_front & (r < near) { 1.0 } else { 0.0 };
+        };
+        for (residuals, sides) in residuals.iter().zip(sides) {
+            for j in 0..WIDTH {
+                add(j, residuals[j], sides[j]);
+            }
+        }
+        for (j, (r, sides)) in last_residuals.iter().zip(last_sides).enumerate() {
+            add(j, *r, *sides);
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of matches")]
+        let support = support.iter().sum::<f64>() as usize;
+        (sum.iter().sum(), support)
     }
 }

@@ -205,7 +205,7 @@ fn linearised<const SPHERE: bool>(
 
 /// `D2 E D1`, row by row.
 #[inline]
-fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f64; 9] {
+pub(super) fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f64; 9] {
     std::array::from_fn(|k| d2[k / 3] * e[(k / 3, k % 3)] * d1[k % 3])
 }
 

@@ -14,6 +14,7 @@ use nalgebra::Matrix3;
 
 use super::framed::rows;
 use super::observations::Observations;
+use super::refine::fundamental;
 use crate::lanes::{self, BearingMatches, ImageMatches, Loss, Stop};
 
 /// The loss reaches one at this multiple of the inlier threshold.
@@ -83,7 +84,8 @@ impl<'a> Scorer<'a> {
         let stop = Stop::Unlikely((1.0 - best / count).max(LEAST_MEAN));
         let score = match &self.columns {
             Columns::Plane(columns) => {
-                let f = rows(&self.observations.fundamental(e));
+                let [d1, d2] = self.observations.columns.inverse_scales();
+                let f = fundamental(e, &d1, &d2);
                 self.kernel.score(columns, &f, self.reach, self.loss, stop)
             }
             Columns::Sphere(columns) => self.kernel.score(columns, &rows(e), self.reach, self.loss, stop),
