@@ -107,7 +107,10 @@ pub(super) fn of_pose(
         jacobian.fixed_view_mut::<3, 1>(3, k).copy_from(&column);
     }
     let mut covariance = jacobian * five * jacobian.transpose();
-    let along = motion.direction * motion.direction.transpose() * size.variance;
+    // To second order the length is |t| (1 + x + x²), as if the motion had its inverse, x² having twice the square of the variance.
+    let by_motion = size.slope.dot(&(five * size.slope));
+    let second_order = 2.0 * by_motion * (by_motion / size.value.powi(2)).min(1.0);
+    let along = motion.direction * motion.direction.transpose() * (size.variance + second_order);
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += along;
     // Rounding must not show which triangle it was computed from.
