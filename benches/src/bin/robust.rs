@@ -319,9 +319,9 @@ impl Arguments {
 fn scale_by_true(scene: &mut Scene, is_true: &[bool]) -> Result<(), SceneError> {
     let true_points: Vec<_> =
         scene.points1.iter().zip(is_true).filter(|(_, is_true)| **is_true).map(|(x1, _)| *x1).collect();
-    if !true_points.is_empty() {
-        let scaled = Scene::from_points(scene.truth, true_points.clone())?;
-        let scale = scaled.points1[0].z / true_points[0].z;
+    if let Some(first) = true_points.first().copied() {
+        let scaled = Scene::from_points(scene.truth, true_points)?;
+        let scale = scaled.points1[0].z / first.z;
         scene.truth = scaled.truth;
         scene.points1.iter_mut().for_each(|x1| *x1 *= scale);
     }

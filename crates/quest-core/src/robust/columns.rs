@@ -40,8 +40,14 @@ pub(super) struct Look {
 impl Look {
     /// Whether the point of a match may be in front of both cameras in a pose.
     pub(super) fn is_in_front(&self, index: usize, pose: usize) -> bool {
-        self.sides[index] >> pose & 1 != 0
+        is_in_front(self.sides[index], pose)
     }
+}
+
+/// Whether the bit of a pose is set in those of a match.
+#[inline(always)]
+pub(super) fn is_in_front(sides: u32, pose: usize) -> bool {
+    sides >> pose & 1 != 0
 }
 
 impl Columns {

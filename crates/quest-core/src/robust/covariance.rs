@@ -20,18 +20,16 @@ use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion};
 use super::columns::Columns;
 use super::inverse_depth::{InverseDepth, Usual};
 use super::length::Length;
-use super::loss::{Loss, Truncated};
+use super::loss::LEAST_SQUARES;
 use super::observations::Observations;
 use super::polish::Polished;
 use super::pose_score::Scored;
-use super::refine::Subset;
+use super::refine::{One, Subset};
 use super::transfer::rotation_hessian;
 use crate::epipolar_frame::tangent_basis;
 
 /// Inliers, at most, that the normal equations are summed over.
 const ENOUGH: usize = 2_000;
-
-const LEAST_SQUARES: Truncated = Truncated { square_limit: f64::INFINITY };
 
 /// The covariance of the five parameters of a motion.
 fn of_motion(
@@ -78,10 +76,8 @@ fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matri
     let Polished { scored: Scored { motion, .. }, loss, limit, .. } = polished;
     let mut sum = Matrix5::zeros();
     for index in false_matches.agreeing(motion, *limit) {
-        let own = Subset::new(false_matches, &[index]).equations(motion, &LEAST_SQUARES);
-        let weight = loss.cost_and_weight(own.cost).1;
-        let leverage = weight * (inverse * own.hessian).trace();
-        sum += own.hessian * (own.cost * weight * weight / (1.0 + leverage));
+        let own = One::new(false_matches, index, motion, loss, inverse);
+        sum += own.hessian * (own.square * own.weight * own.weight / (1.0 + own.leverage));
     }
     sum / false_matches.len().max(1) as f64
 }
@@ -97,10 +93,11 @@ pub(super) fn of_pose(
     let five = of_motion(observations, inliers, polished, false_matches)?;
     let motion = &polished.scored.motion;
     let tangent = tangent_basis(&motion.direction);
+    let slope = size.slope(&tangent);
     let mut jacobian = SMatrix::<f64, 6, 5>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
     for k in 0..5 {
-        let mut column = motion.direction * size.slope[k];
+        let mut column = motion.direction * slope[k];
         if k >= 3 {
             column += tangent[k - 3] * size.value;
         }
@@ -108,7 +105,7 @@ pub(super) fn of_pose(
     }
     let mut covariance = jacobian * five * jacobian.transpose();
     // To second order the length is |t| (1 + x + x²), as if the motion had its inverse, x² having twice the square of the variance.
-    let by_motion = size.slope.dot(&(five * size.slope));
+    let by_motion = slope.dot(&(five * slope));
     let second_order = 2.0 * by_motion * (by_motion / size.value.powi(2)).min(1.0);
     let along = motion.direction * motion.direction.transpose() * (size.variance + second_order);
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
@@ -147,8 +144,8 @@ mod tests {
     use crate::solver::motion::Motion;
     use nalgebra::{UnitQuaternion, Vector3};
 
-    /// The determinant of the covariance of the direction, by the covariance and by the normal equations alone.
-    fn variances(matches: &[Correspondence], motion: Motion) -> [f64; 2] {
+    /// The determinant of the covariance of the direction, as it is given and by the normal equations alone.
+    fn determinants(matches: &[Correspondence], motion: Motion) -> [f64; 2] {
         let order = (0..matches.len()).collect();
         let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2]);
         let mut poses = PoseScorer::new(&observations, 1.5, Score::default());
@@ -176,13 +173,13 @@ mod tests {
             .map(|[a, b]| Correspondence::from_image_points([a.x, a.y], [b.x, b.y]).unwrap())
             .collect();
         let motion = Motion { q_21: scene.truth.q_21, direction: -Vector3::z() };
-        let [without, plain_without] = variances(&matches, motion);
+        let [without, plain_without] = determinants(&matches, motion);
         // Of points as they are seen the two agree, but for the loss and the spread of depths.
         assert!((without / plain_without - 1.0).abs() < 0.2, "{without} {plain_without}");
         // One pixel away from the epipole, and turned to be 0.2 pixels away by its noise: as if it were very near.
         let pixel = 1.0 / FOCAL_LENGTH;
         matches.push(Correspondence::from_image_points([pixel, 0.0], [0.2 * pixel, 0.0]).unwrap());
-        let [with, plain_with] = variances(&matches, motion);
+        let [with, plain_with] = determinants(&matches, motion);
         assert!(plain_with < 0.01 * plain_without, "{plain_with} {plain_without}");
         // One match of a hundred more, and where most inverse depths are has moved by one match.
         assert!((with / without - 1.0).abs() < 0.5, "{with} {without}");

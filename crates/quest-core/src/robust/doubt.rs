@@ -17,11 +17,10 @@
 use std::f64::consts::PI;
 
 use super::inverse_depth::{InverseDepth, Usual};
-use super::loss::{Loss, Truncated};
 use super::observations::Observations;
 use super::polish::{FEWEST, Polished, sigma};
 use super::pose_score::PoseScorer;
-use super::refine::{FINE, Subset, refine};
+use super::refine::{FINE, One, Subset, refine};
 use super::score::MANY;
 use crate::solver::motion::Motion;
 
@@ -79,13 +78,11 @@ fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polis
     let inverse = factor.inverse();
     let prior = inliers.len() as f64 / (observations.len() - inliers.len() + 1) as f64;
     let area = observations.area_of_view2();
-    let all = Truncated::new(f64::INFINITY);
     let is_doubtful = |candidate: &(&u32, &InverseDepth)| {
         let (&index, depth) = *candidate;
-        let own = Subset::new(&observations.columns, &[index]).equations(motion, &all);
-        let leverage = loss.cost_and_weight(own.cost).1 * (inverse * own.hessian).trace();
-        let free = (1.0 - leverage).max(f64::EPSILON);
-        let misfit = 1.0 + own.cost / (free * loss.square_scale());
+        let own = One::new(&observations.columns, index, motion, &loss, &inverse);
+        let free = (1.0 - own.leverage).max(f64::EPSILON);
+        let misfit = 1.0 + own.square / (free * loss.square_scale());
         let across = free.sqrt() / ((2.0 * PI).sqrt() * sigma * misfit * misfit);
         let along = usual.density(depth, sigma) / (2.0 * depth.precision.sqrt());
         prior * area * across * along < 1.0

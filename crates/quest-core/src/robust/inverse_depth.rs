@@ -1,5 +1,7 @@
 //! Inverse depths, whose noise is symmetric where depths have none that could be named.
 
+use std::ops::Mul;
+
 use nalgebra::Vector3;
 
 use super::columns::Columns;
@@ -20,6 +22,7 @@ const SQUARE: f64 = 1e-18;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InverseDepth {
     pub(super) x1: Vector3<f64>,
+    pub(super) x2: Vector3<f64>,
     pub(super) value: f64,
     pub(super) precision: f64,
 }
@@ -32,7 +35,33 @@ impl InverseDepth {
         let square = across.norm_squared().max(SQUARE);
         let value = -across.dot(&x2.cross(&(motion.q_21 * x1))) / square;
         let precision = square / (x2.norm_squared() * columns.square_angle_of_pixel());
-        Self { x1, value, precision }
+        Self { x1, x2, value, precision }
+    }
+
+    /// In view 1 and in view 2, by the motion: `z1 R x1 + t = z2 x2`, crossed with `x2` and with `y = R x1`.
+    pub(super) fn differentiated(&self, motion: &Motion) -> [Differentiated; 2] {
+        let Self { x1, x2, value: rho1, .. } = self;
+        let (y, t) = (motion.q_21 * x1, motion.direction);
+        // ρ1 = −a · c / a² with a = x2 × t and c = x2 × y.
+        let (a, c) = (x2.cross(&t), x2.cross(&y));
+        let inverse = 1.0 / a.norm_squared().max(SQUARE);
+        let around = a.cross(x2);
+        let one = Differentiated {
+            value: *rho1,
+            by_rotation: around.cross(&y) * inverse,
+            by_direction: (x2.cross(&c) - around * (2.0 * rho1)) * inverse,
+        };
+        // ρ2 = −b · c / b² with b = y × t.
+        let b = y.cross(&t);
+        let inverse = 1.0 / b.norm_squared().max(SQUARE);
+        let rho2 = -b.dot(&c) * inverse;
+        let by_b = -c - b * (2.0 * rho2);
+        let two = Differentiated {
+            value: rho2,
+            by_rotation: y.cross(&(t.cross(&by_b) - b.cross(x2))) * inverse,
+            by_direction: by_b.cross(&y) * inverse,
+        };
+        [one, two]
     }
 
     /// Of all of these matches.
@@ -55,30 +84,15 @@ pub(super) struct Differentiated {
     pub(super) by_direction: Vector3<f64>,
 }
 
-impl Differentiated {
-    /// Those of a match in view 1 and in view 2: `z1 R x1 + t = z2 x2`, crossed with `x2` and with `y = R x1`.
-    pub(super) fn both([x1, x2]: &[Vector3<f64>; 2], motion: &Motion) -> [Self; 2] {
-        let (y, t) = (motion.q_21 * x1, motion.direction);
-        // ρ1 = −a · c / a² with a = x2 × t and c = x2 × y.
-        let (a, c) = (x2.cross(&t), x2.cross(&y));
-        let inverse = 1.0 / a.norm_squared().max(SQUARE);
-        let (rho1, around) = (-a.dot(&c) * inverse, a.cross(x2));
-        let one = Self {
-            value: rho1,
-            by_rotation: around.cross(&y) * inverse,
-            by_direction: (x2.cross(&c) - around * (2.0 * rho1)) * inverse,
-        };
-        // ρ2 = −b · c / b² with b = y × t.
-        let b = y.cross(&t);
-        let inverse = 1.0 / b.norm_squared().max(SQUARE);
-        let rho2 = -b.dot(&c) * inverse;
-        let by_b = -c - b * (2.0 * rho2);
-        let two = Self {
-            value: rho2,
-            by_rotation: y.cross(&(t.cross(&by_b) - b.cross(x2))) * inverse,
-            by_direction: by_b.cross(&y) * inverse,
-        };
-        [one, two]
+impl Mul<f64> for Differentiated {
+    type Output = Self;
+
+    fn mul(self, scale: f64) -> Self {
+        Self {
+            value: self.value * scale,
+            by_rotation: self.by_rotation * scale,
+            by_direction: self.by_direction * scale,
+        }
     }
 }
 
@@ -129,6 +143,7 @@ impl Usual {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robust::observations::Image;
     use nalgebra::{Unit, UnitQuaternion};
 
     #[test]
@@ -140,7 +155,11 @@ mod tests {
         let x1 = Vector3::new(0.3, -0.2, 1.0);
         let point2 = motion.q_21 * x1 * 5.0 + motion.direction;
         let points = [x1, point2 / point2.z];
-        let [one, two] = Differentiated::both(&points, &motion);
+        let differentiated = |points: [Vector3<f64>; 2], motion: &Motion| {
+            let columns = Columns::of_points([Image::Plane([1.0; 2]); 2], [points].into_iter());
+            InverseDepth::new(&columns, motion, 0).differentiated(motion)
+        };
+        let [one, two] = differentiated(points, &motion);
         // Rounding of products of order one.
         assert!((one.value - 0.2).abs() < 1e-14 && (two.value * point2.z - 1.0).abs() < 1e-13);
         // Off the epipolar plane the two differ, and so do the derivatives.
@@ -148,9 +167,9 @@ mod tests {
         let h = 1e-6;
         let at = |turn: Vector3<f64>, by: Vector3<f64>| {
             let q_21 = UnitQuaternion::from_scaled_axis(turn) * motion.q_21;
-            Differentiated::both(&points, &Motion { q_21, direction: motion.direction + by }).map(|d| d.value)
+            differentiated(points, &Motion { q_21, direction: motion.direction + by }).map(|d| d.value)
         };
-        let all = Differentiated::both(&points, &motion);
+        let all = differentiated(points, &motion);
         for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
             let zero = Vector3::zeros();
             let (turned, back) = (at(axis * h, zero), at(-axis * h, zero));

@@ -7,12 +7,11 @@
 //! The noise of depths, given the motion, averages out soon. What is left of the variance is which points the mean is over: true
 //! matches beyond the threshold are not among the inliers, and false ones are, with any depth.
 
-use nalgebra::Vector5;
+use nalgebra::{Vector3, Vector5};
 
 use super::columns::Columns;
 use super::inverse_depth::{Differentiated, InverseDepth};
 use super::observations::Observations;
-use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::Motion;
 
 /// A depth is clear of its noise at so many standard deviations.
@@ -27,54 +26,53 @@ const ENOUGH: usize = 2_000;
 /// The variance of a median over that of the mean, of normal variables.
 const MEDIAN_VARIANCE: f64 = std::f64::consts::FRAC_PI_2;
 
-/// A length, its variance by the noise of the depths alone, and its derivatives by the parameters of
-/// [`Motion::stepped`].
+/// A length, its variance for a given motion, and its derivatives by that.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Length {
     pub(super) value: f64,
     pub(super) variance: f64,
-    pub(super) slope: Vector5<f64>,
+    by_rotation: Vector3<f64>,
+    by_direction: Vector3<f64>,
 }
 
-/// The mean inverse depth of a match in both views.
+impl Length {
+    /// The derivatives by the parameters of [`Motion::stepped`].
+    pub(super) fn slope(&self, tangent: &[Vector3<f64>; 2]) -> Vector5<f64> {
+        let [t0, t1] = tangent.map(|tangent| self.by_direction.dot(&tangent));
+        Vector5::new(self.by_rotation.x, self.by_rotation.y, self.by_rotation.z, t0, t1)
+    }
+}
+
+/// The inverse depths of a match in view 1 and in view 2, and their variance.
 #[derive(Clone, Copy, Debug)]
-struct MeanDepth {
-    rho: [f64; 2],
-    slopes: [Vector5<f64>; 2],
+struct BothDepths {
+    rho: [Differentiated; 2],
     variance: f64,
 }
 
-impl MeanDepth {
+impl BothDepths {
     /// Of a match whose vectors have these lengths where they were given: depths are multiples of them.
     fn new(columns: &Columns, index: usize, lengths: Option<[f64; 2]>, motion: &Motion, sigma: f64) -> Self {
-        let tangent = tangent_basis(&motion.direction);
-        let points = columns.vectors(index);
-        let scales = lengths.map_or([1.0; 2], |lengths| [0, 1].map(|k| lengths[k] / points[k].norm()));
-        let both = Differentiated::both(&points, motion);
-        let slope = |k: usize| {
-            let Differentiated { by_rotation, by_direction, .. } = both[k];
-            let [t0, t1] = tangent.map(|tangent| by_direction.dot(&tangent));
-            Vector5::new(by_rotation.x, by_rotation.y, by_rotation.z, t0, t1) * scales[k]
-        };
-        Self {
-            rho: [0, 1].map(|k| both[k].value * scales[k]),
-            slopes: [0, 1].map(slope),
-            variance: InverseDepth::new(columns, motion, index).variance(sigma),
-        }
+        let depth = InverseDepth::new(columns, motion, index);
+        let scales =
+            lengths.map_or([1.0; 2], |[first, second]| [first / depth.x1.norm(), second / depth.x2.norm()]);
+        let [one, two] = depth.differentiated(motion);
+        Self { rho: [one * scales[0], two * scales[1]], variance: depth.variance(sigma) }
     }
 
     /// Its variance over its square.
     fn relative(&self) -> f64 {
-        let sum = self.rho[0] + self.rho[1];
+        let sum = self.rho[0].value + self.rho[1].value;
         4.0 * self.variance / (sum * sum)
     }
 
+    /// The mean of the two depths.
     fn z(&self) -> f64 {
-        0.5 * (1.0 / self.rho[0] + 1.0 / self.rho[1])
+        0.5 * (1.0 / self.rho[0].value + 1.0 / self.rho[1].value)
     }
 
     fn is_clear(&self) -> bool {
-        self.rho.iter().all(|rho| *rho > 0.0) && self.relative() < 1.0 / (CLEAR * CLEAR)
+        self.rho.iter().all(|rho| rho.value > 0.0) && self.relative() < 1.0 / (CLEAR * CLEAR)
     }
 }
 
@@ -90,24 +88,25 @@ pub(super) struct Noise<'a> {
 pub(super) fn length(observations: &Observations, motion: &Motion, inliers: &[u32], noise: &Noise) -> Length {
     let some = &inliers[..inliers.len().min(ENOUGH)];
     if some.is_empty() {
-        return Length { value: 0.0, variance: 0.0, slope: Vector5::zeros() };
+        let zero = Vector3::zeros();
+        return Length { value: 0.0, variance: 0.0, by_rotation: zero, by_direction: zero };
     }
     let of_inlier = |&index: &u32| {
         let m = &observations.matches[index as usize];
         let lengths = Some([m.length1(), m.length2()]);
-        MeanDepth::new(&observations.columns, index as usize, lengths, motion, noise.sigma)
+        BothDepths::new(&observations.columns, index as usize, lengths, motion, noise.sigma)
     };
     let all: Vec<_> = some.iter().map(of_inlier).collect();
-    let clear: Vec<_> = all.iter().copied().filter(MeanDepth::is_clear).collect();
+    let clear: Vec<_> = all.iter().copied().filter(BothDepths::is_clear).collect();
     if (clear.len() as f64) < MOST * all.len() as f64 {
         return by_inverse_depths(&all);
     }
     let Noise { sigma, threshold, false_matches } = *noise;
-    let of_false = |index: u32| MeanDepth::new(false_matches, index as usize, None, motion, sigma);
+    let of_false = |index: u32| BothDepths::new(false_matches, index as usize, None, motion, sigma);
     let agreeing = false_matches.agreeing(motion, threshold).into_iter().map(of_false);
     let outliers = (observations.len() - inliers.len()) as f64 * some.len() as f64 / inliers.len() as f64;
     let chance = Chance {
-        depths: agreeing.filter(MeanDepth::is_clear).map(|depth| depth.z()).collect(),
+        depths: agreeing.filter(BothDepths::is_clear).map(|depth| depth.z()).collect(),
         each: outliers / false_matches.len().max(1) as f64,
         missed: beyond(threshold / sigma),
     };
@@ -131,13 +130,16 @@ struct Chance {
 }
 
 /// The inverse of the mean of depths that are clear of noise.
-fn by_depths(all: &[MeanDepth], chance: &Chance) -> Length {
-    let (mut sum, mut slope) = (0.0, Vector5::zeros());
+fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
+    let (mut sum, mut by_rotation, mut by_direction) = (0.0, Vector3::zeros(), Vector3::zeros());
     for depth in all {
         // The mean of 1/ρ over the noise is (1 + relative variance)/ρ to second order.
         sum += depth.z() * (1.0 - depth.relative());
-        let [z1, z2] = depth.rho.map(|rho| 1.0 / rho);
-        slope += (depth.slopes[0] * (z1 * z1) + depth.slopes[1] * (z2 * z2)) * 0.5;
+        for rho in &depth.rho {
+            let weight = 0.5 / (rho.value * rho.value);
+            by_rotation += rho.by_rotation * weight;
+            by_direction += rho.by_direction * weight;
+        }
     }
     let count = all.len() as f64;
     let value = count / sum;
@@ -147,23 +149,27 @@ fn by_depths(all: &[MeanDepth], chance: &Chance) -> Length {
     let of_missed = chance.missed * all.iter().map(|depth| square(&depth.z())).sum::<f64>();
     let of_false = chance.each * chance.depths.iter().map(square).sum::<f64>();
     // d(n/Σz) = (n/Σz)² Σ z² dρ / n.
+    let by_mean = value * value / count;
     Length {
         value,
         variance: (of_noise + of_missed + of_false) * (value / count).powi(2),
-        slope: slope * (value * value / count),
+        by_rotation: by_rotation * by_mean,
+        by_direction: by_direction * by_mean,
     }
 }
 
 /// The median of the inverse depths, with the slope of their mean.
-fn by_inverse_depths(all: &[MeanDepth]) -> Length {
+fn by_inverse_depths(all: &[BothDepths]) -> Length {
     let count = all.len() as f64;
-    let [mut first, mut second] = [0, 1].map(|k| all.iter().map(|depth| depth.rho[k]).collect::<Vec<_>>());
+    let [mut first, mut second] =
+        [0, 1].map(|k| all.iter().map(|depth| depth.rho[k].value).collect::<Vec<_>>());
     let variance: f64 = all.iter().map(|depth| depth.variance).sum();
-    let slope: Vector5<f64> = all.iter().map(|depth| depth.slopes[0] + depth.slopes[1]).sum();
+    let all = || all.iter().flat_map(|depth| &depth.rho);
     Length {
         value: 0.5 * (median(&mut first) + median(&mut second)),
         variance: MEDIAN_VARIANCE * variance / (count * count),
-        slope: slope / (2.0 * count),
+        by_rotation: all().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() / (2.0 * count),
+        by_direction: all().map(|rho| rho.by_direction).sum::<Vector3<f64>>() / (2.0 * count),
     }
 }
 

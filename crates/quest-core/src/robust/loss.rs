@@ -47,6 +47,9 @@ pub(super) struct GemanMcClure {
     pub(super) inverse_square: f64,
 }
 
+/// No loss at all.
+pub(super) const LEAST_SQUARES: Truncated = Truncated { square_limit: f64::INFINITY };
+
 impl Truncated {
     pub(super) fn new(limit: f64) -> Self {
         Self { square_limit: limit * limit }

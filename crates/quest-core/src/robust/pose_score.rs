@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::columns::{Look, POSES};
+use super::columns::{Look, POSES, is_in_front};
 use super::observations::Observations;
 use super::score::{MANY, REACH, cost};
 use super::widest::{Work, widest};
@@ -147,7 +147,7 @@ impl Judging<'_> {
         let (residuals, last_residuals) = look.residuals.as_chunks::<WIDTH>();
         let (sides, last_sides) = look.sides.as_chunks::<WIDTH>();
         let mut add = |j: usize, r: f64, sides: u32| {
-            let (r, is_in_front) = (r.abs(), sides >> pose & 1 != 0);
+            let (r, is_in_front) = (r.abs(), is_in_front(sides, pose));
             let loss = cost(r * inverse_reach);
             sum[j] += if (r < judged) & !is_in_front { 1.0 } else { loss };
             support[j] += if is_in_front & (r < near) { 1.0 } else { 0.0 };

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Matrix5, Vector5};
 
 use super::columns::Columns;
-use super::loss::Loss;
+use super::loss::{LEAST_SQUARES, Loss};
 use super::widest::{Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::solver::motion::{Motion, damped_step};
@@ -48,6 +48,35 @@ pub(super) struct Equations {
     pub(super) cost: f64,
     pub(super) hessian: Matrix5<f64>,
     pub(super) gradient: Vector5<f64>,
+}
+
+/// What one match says of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct One {
+    /// `r²`.
+    pub(super) square: f64,
+    /// `J Jᵀ`.
+    pub(super) hessian: Matrix5<f64>,
+    /// `ψ/r` under the loss.
+    pub(super) weight: f64,
+    /// `ψ/r Jᵀ H⁻¹ J`.
+    pub(super) leverage: f64,
+}
+
+impl One {
+    /// `inverse` is `H⁻¹` of the matches that the motion was fitted to.
+    pub(super) fn new(
+        all: &Columns,
+        index: u32,
+        motion: &Motion,
+        loss: &impl Loss,
+        inverse: &Matrix5<f64>,
+    ) -> Self {
+        let Equations { cost: square, hessian, .. } =
+            Subset::new(all, &[index]).equations(motion, &LEAST_SQUARES);
+        let weight = loss.cost_and_weight(square).1;
+        Self { square, hessian, weight, leverage: weight * (inverse * hessian).trace() }
+    }
 }
 
 impl Subset {

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use super::framed::{Framed, Lanes, WIDTH, rows, whitened};
-use super::loss::{Loss, Truncated};
+use super::loss::{LEAST_SQUARES, Loss};
 use super::widest::{Work, widest};
 
 /// A descent is at its end when the next step gains no more than this in units of the mean cost of a match.
@@ -191,5 +191,5 @@ pub(super) fn refine_rotation(
 /// `Σ Jᵀ J` of a rotation, without weights.
 pub(super) fn rotation_hessian(matches: &Framed, q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    equations(matches, &r_21, &Truncated::new(f64::INFINITY), Turn).hessian
+    equations(matches, &r_21, &LEAST_SQUARES, Turn).hessian
 }
