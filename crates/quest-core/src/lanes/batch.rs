@@ -170,7 +170,7 @@ impl Batch<'_> {
     fn solve<L: WordLanes>(self, lanes: L) -> Result<(), SampleError> {
         let tables = Tables::get();
         let mut bearings: Bearings = [[[0.0; MAX_LANES]; 15]; 2];
-        let mut space = Space { cubics: Cubics::new(lanes), grid: Grid::new(), cells: Cells::new() };
+        let mut space = Space { cubics: cubics::empty(lanes), grid: Grid::new(), cells: Cells::new() };
         let mut found = Found::new();
         for (group, samples) in self.samples.chunks(L::COUNT).enumerate() {
             gather::<L>(self.matches, samples, &mut bearings)
@@ -275,7 +275,7 @@ fn solve_group<L: WordLanes>(
     let (frame, mut rows) = frame(lanes, &a, &b);
     let (basis, independence) = null_space(lanes, &mut rows);
     cubics::fill(lanes, &basis, frame.parallax, &mut space.cubics);
-    let (reduced, pivot) = reduce(lanes, &mut space.cubics.columns);
+    let (reduced, pivot) = reduce(lanes, &mut space.cubics);
     let resultant = Resultant::<L>::new(lanes, &reduced);
     let polynomial = resultant.polynomial(lanes);
     let mirrored = roots::mirrored::<L>(&polynomial);

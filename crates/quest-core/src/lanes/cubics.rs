@@ -1,12 +1,10 @@
-//! The ten cubics of the parallax-safe form, over twenty monomials.
-//!
-//! The trace constraint divided by `p` as the scalar solver's module derives it, halved, and not parted into its symmetric and
-//! antisymmetric parts as there: with `K = [t]×` and `E = K + p S`
+//! The ten cubics of the parallax-safe form, over twenty monomials, as the scalar solver's module derives them: with
+//! `h = tr S`, `Z = h I − 2 S` and `A = adj Z`
 //!
 //! ```text
-//! Λ = 2 (K S − S K) + p (2 S² − tr(S²) I)
-//! −t (tᵀ S) + Λ/2 E = 0                 nine cubics
-//! det(tr(S) I − 2 S) / 2 = 0            the tenth
+//! (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − h (t tᵀ + ¼ p² (tr(A) I − A)) = 0        six cubics
+//! A t = 0                                                                three
+//! det Z = 0                                                              one
 //! ```
 
 use super::lane::{F, Float, Lanes};
@@ -15,147 +13,99 @@ use crate::solver::forms::{PRODUCT, SQUARE};
 
 type Linear<L> = [F<L>; 4];
 type Quadratic<L> = [F<L>; 10];
-type Cubic<L> = [F<L>; 20];
 /// The coefficients of one monomial in all cubics.
 pub(super) type Column<L> = [F<L>; 10];
+/// One for each monomial of [`CUBIC`](crate::solver::forms::CUBIC).
+pub(super) type Cubics<L> = [Column<L>; 20];
 
-/// The position in a triangle of the entry of a symmetric matrix.
-const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+/// The places of `xx, yy, zz, xy, xz, yz` in a matrix.
+const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// The ten cubics, and room to compute them in.
-pub(super) struct Cubics<L: Lanes<f64>> {
-    /// One for each monomial of [`CUBIC`](crate::solver::forms::CUBIC).
-    pub(super) columns: [Column<L>; 20],
-    /// Of three cubics the quadratic factors of the four variables.
-    factors: [[Quadratic<L>; 4]; 3],
-}
-
-impl<L: Lanes<f64>> Cubics<L> {
-    /// Cubics to be filled.
-    #[inline(always)]
-    pub(super) fn new(lanes: L) -> Self {
-        let zero = lanes.splat(0.0);
-        Self { columns: [[zero; 10]; 20], factors: [[[zero; 10]; 4]; 3] }
-    }
+/// The cubics' coefficients, ready to be written to.
+#[inline(always)]
+pub(super) fn empty<L: Lanes<f64>>(lanes: L) -> Cubics<L> {
+    [[lanes.splat(0.0); 10]; 20]
 }
 
 /// Fills the cubics.
-///
-/// A cubic is a sum of products of quadratic and linear forms. It is summed variable by variable of the linear forms: the ten
-/// coefficients of a quadratic form fit into the registers, the twenty of a cubic do not.
 #[inline(always)]
 pub(super) fn fill<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, p: F<L>, out: &mut Cubics<L>) {
     let [t0, t1, t2, xx, yy, zz, xy, xz, yz] = basis;
-    let forms = Forms::new(basis, p);
-    let lambda = forms.half_lambda(lanes, basis);
-    for (j, s) in [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].iter().enumerate() {
-        let row = sum_of_products::<L>(lanes, &[(t0, s[0]), (t1, s[1]), (t2, s[2])]);
-        for v in 0..4 {
-            for i in 0..3 {
-                let [a, b, c] = SYMMETRIC[i].map(|k| &lambda[k]);
-                let weights = [forms.minus_t[i][v], forms.e[0][j][v], forms.e[1][j][v], forms.e[2][j][v]];
-                out.factors[i][v] = weighted_sum::<L, 4>([&row, a, b, c], weights);
-            }
+    let t = [t0, t1, t2];
+    let (plus, minus) = (lanes.splat(1.0), lanes.splat(-1.0));
+    let minus_two = minus + minus;
+    let minus_trace = combined::<L, 3, 4>([(xx, minus), (yy, minus), (zz, minus)]);
+    let z = [
+        combined::<L, 2, 4>([(&minus_trace, minus), (xx, minus_two)]),
+        combined::<L, 2, 4>([(&minus_trace, minus), (yy, minus_two)]),
+        combined::<L, 2, 4>([(&minus_trace, minus), (zz, minus_two)]),
+        combined::<L, 1, 4>([(xy, minus_two)]),
+        combined::<L, 1, 4>([(xz, minus_two)]),
+        combined::<L, 1, 4>([(yz, minus_two)]),
+    ];
+    let [z_xx, z_yy, z_zz, z_xy, z_xz, z_yz] = &z;
+    let minus_xy = &combined::<L, 1, 4>([(z_xy, minus)]);
+    let minus_xz = &combined::<L, 1, 4>([(z_xz, minus)]);
+    let minus_yz = &combined::<L, 1, 4>([(z_yz, minus)]);
+
+    let turned = [
+        products::<L, 3>(lanes, [(z_xx, t0), (z_xy, t1), (z_xz, t2)]),
+        products::<L, 3>(lanes, [(z_xy, t0), (z_yy, t1), (z_yz, t2)]),
+        products::<L, 3>(lanes, [(z_xz, t0), (z_yz, t1), (z_zz, t2)]),
+    ];
+    let a = [
+        products::<L, 2>(lanes, [(z_yy, z_zz), (minus_yz, z_yz)]),
+        products::<L, 2>(lanes, [(z_xx, z_zz), (minus_xz, z_xz)]),
+        products::<L, 2>(lanes, [(z_xx, z_yy), (minus_xy, z_xy)]),
+        products::<L, 2>(lanes, [(z_xz, z_yz), (minus_xy, z_zz)]),
+        products::<L, 2>(lanes, [(z_xy, z_yz), (minus_xz, z_yy)]),
+        products::<L, 2>(lanes, [(z_xy, z_xz), (minus_yz, z_xx)]),
+    ];
+    let mut squares = [turned[0]; 6];
+    for (square, (i, j)) in squares.iter_mut().zip(PLACES) {
+        *square = products::<L, 1>(lanes, [(t[i], t[j])]);
+    }
+    let minus_square =
+        combined::<L, 3, 10>([(&squares[0], minus), (&squares[1], minus), (&squares[2], minus)]);
+    // What is beside the trace.
+    let quarter = lanes.splat(0.25) * p * p;
+    let mut beside = squares;
+    for k in 0..3 {
+        let (b, c) = (&a[(k + 1) % 3], &a[(k + 2) % 3]);
+        beside[k] = combined::<L, 3, 10>([(&squares[k], plus), (b, quarter), (c, quarter)]);
+        beside[k + 3] = combined::<L, 2, 10>([(&squares[k + 3], plus), (&a[k + 3], -quarter)]);
+    }
+
+    for (k, (i, j)) in PLACES.into_iter().enumerate() {
+        let symmetric = [(&turned[i], t[j]), (&turned[j], t[i])];
+        let [first, second] = symmetric;
+        set::<L, 4>(lanes, out, k, [first, second, (&minus_square, &z[k]), (&beside[k], &minus_trace)]);
+    }
+    set::<L, 3>(lanes, out, 6, [(&a[0], t0), (&a[3], t1), (&a[4], t2)]);
+    set::<L, 3>(lanes, out, 7, [(&a[3], t0), (&a[1], t1), (&a[5], t2)]);
+    set::<L, 3>(lanes, out, 8, [(&a[4], t0), (&a[5], t1), (&a[2], t2)]);
+    set::<L, 3>(lanes, out, 9, [(&a[0], z_xx), (&a[3], z_xy), (&a[4], z_xz)]);
+}
+
+/// The sum of some forms with weights.
+#[inline(always)]
+fn combined<L: Lanes<f64>, const T: usize, const N: usize>(terms: [(&[F<L>; N], F<L>); T]) -> [F<L>; N] {
+    let mut out = *terms[0].0;
+    for i in 0..N {
+        out[i] = out[i] * terms[0].1;
+        for term in 1..T {
+            let (form, weight) = terms[term];
+            out[i] = form[i].mul_add(weight, out[i]);
         }
-        for i in 0..3 {
-            let cubic = collected::<L>(lanes, &out.factors[i]);
-            for k in 0..20 {
-                out.columns[k][3 * i + j] = cubic[k];
-            }
-        }
     }
-    let tenth = tenth::<L>(lanes, basis);
-    for k in 0..20 {
-        out.columns[k][9] = tenth[k];
-    }
+    out
 }
 
-/// Linear forms that the cubics are made of.
-struct Forms<L: Lanes<f64>> {
-    minus_t: [Linear<L>; 3],
-    /// `p S`: the entries `xx, yy, zz, xy, xz, yz`.
-    ps: [Linear<L>; 6],
-    e: [[Linear<L>; 3]; 3],
-}
-
-impl<L: Lanes<f64>> Forms<L> {
-    #[inline(always)]
-    fn new([t0, t1, t2, xx, yy, zz, xy, xz, yz]: &Basis<L>, p: F<L>) -> Self {
-        let ps = [xx, yy, zz, xy, xz, yz].map(|form| form.map(|x| p * x));
-        let [pxx, pyy, pzz, pxy, pxz, pyz] = &ps;
-        let e = [
-            [*pxx, difference::<L>(pxy, t2), add::<L>(pxz, t1)],
-            [add::<L>(pxy, t2), *pyy, difference::<L>(pyz, t0)],
-            [difference::<L>(pxz, t1), add::<L>(pyz, t0), *pzz],
-        ];
-        Self { minus_t: [t0, t1, t2].map(|form| form.map(|x| -x)), ps, e }
-    }
-
-    /// The six different entries of the symmetric `Λ/2 = K S − S K + p (S² − tr(S²)/2 I)`.
-    ///
-    /// Off the diagonal, as `E = K + p S`, the entry of `x` and `y` is `xx E_yx + yy E_xy + yz E_xz − t_x xz`, and so in turn.
-    #[inline(always)]
-    fn half_lambda(&self, lanes: L, basis: &Basis<L>) -> [Quadratic<L>; 6] {
-        let [t0, t1, t2, xx, yy, zz, xy, xz, yz] = basis;
-        let [pxx, pyy, pzz, pxy, pxz, pyz] = &self.ps;
-        let ([m0, m1, m2], e) = (&self.minus_t, &self.e);
-        let off = [
-            sum_of_products::<L>(lanes, &[(xx, &e[1][0]), (yy, &e[0][1]), (yz, &e[0][2]), (xz, m0)]),
-            sum_of_products::<L>(lanes, &[(zz, &e[0][2]), (xx, &e[2][0]), (xy, &e[2][1]), (yz, m2)]),
-            sum_of_products::<L>(lanes, &[(yy, &e[2][1]), (zz, &e[1][2]), (xz, &e[1][0]), (xy, m1)]),
-        ];
-        // On the diagonal, for x: 2 (t_y xz − t_z xy) + p (xx² − yy² − zz² − 2 yz²) / 2.
-        let turned = [(t0, yz), (t1, xz), (t2, xy)].map(|pair| sum_of_products::<L>(lanes, &[pair]));
-        let square = [(pxx, xx), (pyy, yy), (pzz, zz)].map(|pair| sum_of_products::<L>(lanes, &[pair]));
-        let across = [(pyz, yz), (pxz, xz), (pxy, xy)].map(|pair| sum_of_products::<L>(lanes, &[pair]));
-        let (half, two) = (lanes.splat(0.5), lanes.splat(2.0));
-        let mut on = off;
-        for q in 0..10 {
-            let half_trace = half * (square[0][q] + square[1][q] + square[2][q]);
-            for i in 0..3 {
-                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                let symmetric = square[i][q] - half_trace - across[i][q];
-                on[i][q] = two.mul_add(turned[j][q] - turned[k][q], symmetric);
-            }
-        }
-        [on[0], off[0], off[1], on[1], off[2], on[2]]
-    }
-}
-
-/// `det(tr(S) I − 2 S) / 2`.
+/// The sum of some products of linear forms.
 #[inline(always)]
-fn tenth<L: Lanes<f64>>(lanes: L, [_, _, _, xx, yy, zz, xy, xz, yz]: &Basis<L>) -> Cubic<L> {
-    let minus = |form: &Linear<L>| form.map(|x| -x);
-    let double = |form: &Linear<L>| form.map(|x| x + x);
-    let first = [add::<L>(yy, &difference::<L>(zz, xx)).map(|x| lanes.splat(0.5) * x), minus(xy), minus(xz)];
-    let second = [minus(&double(xy)), add::<L>(zz, &difference::<L>(xx, yy)), minus(&double(yz))];
-    let third = [minus(&double(xz)), second[2], add::<L>(xx, &difference::<L>(yy, zz))];
-    let minors = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| {
-        let negative = minus(&second[b]);
-        sum_of_products::<L>(lanes, &[(&second[a], &third[b]), (&negative, &third[a])])
-    });
-    let mut factors = [minors[0]; 4];
-    for v in 0..4 {
-        factors[v] = weighted_sum::<L, 3>(minors.each_ref(), [first[0][v], first[1][v], first[2][v]]);
-    }
-    collected::<L>(lanes, &factors)
-}
-
-#[inline(always)]
-fn add<L: Lanes<f64>>(a: &Linear<L>, b: &Linear<L>) -> Linear<L> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
-}
-
-#[inline(always)]
-fn difference<L: Lanes<f64>>(a: &Linear<L>, b: &Linear<L>) -> Linear<L> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]]
-}
-
-/// `Σ a b` of some linear forms.
-#[inline(always)]
-fn sum_of_products<L: Lanes<f64>>(lanes: L, pairs: &[(&Linear<L>, &Linear<L>)]) -> Quadratic<L> {
+fn products<L: Lanes<f64>, const T: usize>(lanes: L, terms: [(&Linear<L>, &Linear<L>); T]) -> Quadratic<L> {
     let mut out = [lanes.splat(0.0); 10];
-    for (a, b) in pairs {
+    for (a, b) in terms {
         for i in 0..4 {
             for j in 0..4 {
                 let sum = &mut out[SQUARE[i][j]];
@@ -166,32 +116,46 @@ fn sum_of_products<L: Lanes<f64>>(lanes: L, pairs: &[(&Linear<L>, &Linear<L>)]) 
     out
 }
 
-/// The sum of some quadratic forms with weights.
+/// Sets a cubic to the sum of three or four products of a quadratic and a linear form.
 #[inline(always)]
-fn weighted_sum<L: Lanes<f64>, const N: usize>(
-    forms: [&Quadratic<L>; N],
-    weights: [F<L>; N],
-) -> Quadratic<L> {
-    let mut out = [forms[0][0] * weights[0]; 10];
-    for i in 1..10 {
-        out[i] = forms[0][i] * weights[0];
-    }
-    for term in 1..N {
-        for i in 0..10 {
-            out[i] = forms[term][i].mul_add(weights[term], out[i]);
-        }
-    }
-    out
+fn set<L: Lanes<f64>, const T: usize>(
+    lanes: L,
+    out: &mut Cubics<L>,
+    row: usize,
+    terms: [(&Quadratic<L>, &Linear<L>); T],
+) {
+    half::<L, T, 0>(lanes, out, row, terms);
+    half::<L, T, 1>(lanes, out, row, terms);
 }
 
-/// The sum of the variables with their quadratic factors.
+/// Sets half of the coefficients: ten sums and a linear form fit into the registers.
 #[inline(always)]
-fn collected<L: Lanes<f64>>(lanes: L, factors: &[Quadratic<L>; 4]) -> Cubic<L> {
-    let mut out = [lanes.splat(0.0); 20];
-    for v in 0..4 {
-        for i in 0..10 {
-            out[PRODUCT[i][v]] = out[PRODUCT[i][v]] + factors[v][i];
+fn half<L: Lanes<f64>, const T: usize, const HALF: usize>(
+    lanes: L,
+    out: &mut Cubics<L>,
+    row: usize,
+    terms: [(&Quadratic<L>, &Linear<L>); T],
+) {
+    let mut sums = [lanes.splat(0.0); 10];
+    add_product::<L, HALF>(&mut sums, terms[0]);
+    add_product::<L, HALF>(&mut sums, terms[1]);
+    add_product::<L, HALF>(&mut sums, terms[2]);
+    if T > 3 {
+        add_product::<L, HALF>(&mut sums, terms[3 % T]);
+    }
+    for i in 0..10 {
+        out[10 * HALF + i][row] = sums[i];
+    }
+}
+
+#[inline(always)]
+fn add_product<L: Lanes<f64>, const HALF: usize>(sums: &mut [F<L>; 10], (a, b): (&Quadratic<L>, &Linear<L>)) {
+    for i in 0..10 {
+        for v in 0..4 {
+            let monomial = PRODUCT[i][v];
+            if monomial / 10 == HALF {
+                sums[monomial % 10] = a[i].mul_add(b[v], sums[monomial % 10]);
+            }
         }
     }
-    out
 }

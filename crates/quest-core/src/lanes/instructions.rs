@@ -11,7 +11,7 @@ use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::sse2::Sse2;
 #[cfg(target_arch = "x86_64")]
-use super::vector::Vector;
+use super::vector::{Align32, Align64, Vector};
 
 /// Vector instructions, from the slowest to the fastest.
 ///
@@ -104,9 +104,9 @@ impl Token {
             #[cfg(target_arch = "x86_64")]
             Self::Sse2(simd) => task.run(Sse2(simd)),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(simd) => Simd::vectorize(simd, Adapter(task)),
+            Self::Avx2(simd) => Simd::vectorize(simd, Adapter::<_, Align32>(task, [])),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512(simd) => Simd::vectorize(simd, Adapter(task)),
+            Self::Avx512(simd) => Simd::vectorize(simd, Adapter::<_, Align64>(task, [])),
         }
     }
 
@@ -126,14 +126,14 @@ impl Token {
 
 /// A task in the form that pulp runs.
 #[cfg(target_arch = "x86_64")]
-struct Adapter<K>(K);
+struct Adapter<K, A>(K, [A; 0]);
 
 #[cfg(target_arch = "x86_64")]
-impl<K: Task> WithSimd for Adapter<K> {
+impl<K: Task, A: Copy> WithSimd for Adapter<K, A> {
     type Output = K::Output;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> K::Output {
-        self.0.run(Vector(simd))
+        self.0.run(Vector::<S, A>::new(simd))
     }
 }

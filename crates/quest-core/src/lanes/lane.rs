@@ -47,6 +47,11 @@ pub trait Float<T>:
     fn neg_mul_add(self, b: Self, c: Self) -> Self;
     /// The square root.
     fn sqrt(self) -> Self;
+    /// `1/√` of a positive number, to rounding, which in `f32` may be 5e-6 of it; of others anything.
+    #[inline(always)]
+    fn inverse_sqrt(self) -> Self {
+        self.sqrt() / self
+    }
     /// The absolute value.
     fn abs(self) -> Self;
     /// `self < other`: false where one of them is not a number.

@@ -25,7 +25,7 @@ pub(super) mod sealed {
         /// All matches; NaN fill the last block.
         fn blocks(&self) -> &[Self::Block];
 
-        /// The square of `x2ᵀ E x1` and that of its gradient for the matches of a block from `k` on, as many as there are lanes.
+        /// `x2ᵀ E x1` and the square of its gradient for the matches of a block from `k` on, as many as there are lanes.
         fn constraint<L: Lanes<T>>(
             lanes: L,
             e: &[F<L, T>; 9],
@@ -207,7 +207,7 @@ fn on_plane<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, u, v]: [F<L, T>; 4]) -> (F<
     let r = u.mul_add(line2[0], v.mul_add(line2[1], line2[2]));
     let gradient1 = line1[0].mul_add(line1[0], line1[1] * line1[1]);
     let gradient2 = line2[0].mul_add(line2[0], line2[1] * line2[1]);
-    (r * r, gradient1 + gradient2)
+    (r, gradient1 + gradient2)
 }
 
 /// Of bearings `(x, y, z)` and `(u, v, w)`.
@@ -227,5 +227,5 @@ fn on_sphere<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, z, u, v, w]: [F<L, T>; 6])
     let square = r * r;
     let gradient1 = plane1[0].mul_add(plane1[0], plane1[1].mul_add(plane1[1], plane1[2] * plane1[2]));
     let gradient2 = plane2[0].mul_add(plane2[0], plane2[1].mul_add(plane2[1], plane2[2] * plane2[2]));
-    (square, gradient1 + gradient2 - (square + square))
+    (r, gradient1 + gradient2 - (square + square))
 }

@@ -28,18 +28,18 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Sum<'_, T, C> {
     #[inline(always)]
     fn run<L: Lanes<T>>(self, lanes: L) -> Score {
         match self.loss {
-            Loss::Truncated => self.sum(lanes, truncated),
-            Loss::Marginalised => self.sum(lanes, marginalised),
+            Loss::Truncated => self.sum::<L, Truncated>(lanes),
+            Loss::Marginalised => self.sum::<L, Marginalised>(lanes),
         }
     }
 }
 
 impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
     #[inline(always)]
-    fn sum<L: Lanes<T>>(&self, lanes: L, count: impl Fn(F<L, T>, F<L, T>) -> F<L, T>) -> Score {
+    fn sum<L: Lanes<T>, W: Worth>(&self, lanes: L) -> Score {
         let zero = lanes.splat(T::from_f64(0.0));
         let square = self.threshold * self.threshold;
-        let limit = lanes.splat(T::from_f64(square));
+        let (threshold, limit) = (lanes.splat(T::from_f64(self.threshold)), lanes.splat(T::from_f64(square)));
         let e = splat::<T, L>(lanes, &self.e);
         let (all, inverse) = (self.matches.len(), 1.0 / square);
         let mut score = Score { sum: 0.0, visited: 0 };
@@ -47,9 +47,9 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
             let mut sum = zero;
             for k in 0..BLOCK / L::COUNT {
                 let (error, gradient) = C::constraint(lanes, &e, block, k * L::COUNT);
-                let error = error / gradient;
-                // False for the NaN that fill the last block.
-                sum = sum + count(limit, error).select(error.less(limit), zero);
+                // False for the NaN that fill the last block, and where there is no gradient.
+                let is_inlier = (error * error).less(gradient * limit);
+                sum = sum + W::of_inlier(threshold, error, gradient).select(is_inlier, zero);
             }
             score.sum += sum.sum().into() * inverse;
             score.visited = all.min(score.visited + BLOCK);
@@ -61,17 +61,32 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
     }
 }
 
-/// `T² (1 − u²)`, by `T²` and the squared error `T² u²`.
-#[inline(always)]
-fn truncated<T: Real, V: Float<T>>(limit: V, error: V) -> V {
-    limit - error
+/// What an inlier counts, by the threshold `T`, its error `e` and the square of its gradient `g²`, with `T u = e/g`.
+///
+/// Not a function that is handed over: what calls such a one may be compiled for the instructions that every processor has.
+trait Worth {
+    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V;
 }
 
-/// `T² (1 − u)² = T² + r² − 2 T r`.
-#[inline(always)]
-fn marginalised<T: Real, V: Float<T>>(limit: V, error: V) -> V {
-    let root = (limit * error).sqrt();
-    limit + error - (root + root)
+/// `T² (1 − u²)`.
+struct Truncated;
+
+/// `T² (1 − u)²`.
+struct Marginalised;
+
+impl Worth for Truncated {
+    #[inline(always)]
+    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V {
+        threshold * threshold - error * error / square_gradient
+    }
+}
+
+impl Worth for Marginalised {
+    #[inline(always)]
+    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V {
+        let rest = threshold - error.abs() * square_gradient.inverse_sqrt();
+        rest * rest
+    }
 }
 
 /// The inliers of one matrix.
@@ -94,7 +109,7 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Inliers<'_, T, C> {
         for (block, word) in self.matches.blocks().iter().zip(self.mask) {
             for k in (0..BLOCK).step_by(L::COUNT) {
                 let (error, gradient) = C::constraint(lanes, &e, block, k);
-                let is_inlier = error.less(gradient * square);
+                let is_inlier = (error * error).less(gradient * square);
                 let mut flags = [T::from_f64(0.0); MAX_LANES];
                 one.select(is_inlier, zero).store(&mut flags);
                 for (lane, flag) in flags[..L::COUNT].iter().enumerate() {
