@@ -222,7 +222,8 @@ impl Estimate {
 
     /// dict of str to float : The median residual of the inliers under each model, in the unit of the threshold.
     ///
-    /// ``rotation_px`` under a rotation without translation, ``planar_px`` under a plane (infinite where none was found),
+    /// ``rotation_px`` under a rotation without translation (infinite where that leaves most of the points behind camera 2),
+    /// ``planar_px`` under a plane (infinite where none was found),
     /// ``general_px`` under the essential matrix.
     #[getter]
     fn evidence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -31,6 +31,9 @@ use crate::epipolar_frame::tangent_basis;
 /// Inliers, at most, that the normal equations are summed over.
 const ENOUGH: usize = 2_000;
 
+/// Normal equations of unit diagonal have no eigenvalue below this: rounding would make a thousandth of a variance.
+const SINGULAR: f64 = 1e-12;
+
 /// The covariance of the five parameters of a motion.
 fn of_motion(
     observations: &Observations,
@@ -44,7 +47,7 @@ fn of_motion(
     let points = probable_points(observations, some, polished);
     let indices: Vec<u32> = (0..).take(points.len()).collect();
     let hessian = Subset::new(&points, &indices).equations(motion, &LEAST_SQUARES).hessian * (0.5 * share);
-    let inverse = hessian.cholesky()?.inverse();
+    let inverse = inverse(&hessian)?;
     let normal = polished.loss.of_normal(polished.sigma);
     let mut pull = Matrix5::zeros();
     let outliers = (observations.len() - inliers.len()) as f64;
@@ -54,6 +57,17 @@ fn of_motion(
     let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
     let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
     Some((inverse * normal.square + inverse * pull * inverse) * (few * few))
+}
+
+/// The inverse of normal equations; `None` where a change of the motion moves no point by more than rounding does.
+///
+/// That has to be asked of parameters in units of their own: directions count for little where the parallax is small.
+fn inverse(hessian: &Matrix5<f64>) -> Option<Matrix5<f64>> {
+    let scales = hessian.diagonal().map(|square| 1.0 / square.sqrt());
+    let scaled = |matrix: &Matrix5<f64>| matrix.component_mul(&(scales * scales.transpose()));
+    let correlated = scaled(hessian);
+    (correlated - Matrix5::identity() * SINGULAR).cholesky()?;
+    Some(scaled(&correlated.cholesky()?.inverse()))
 }
 
 /// The inliers, exactly as the motion sees them, with inverse depths one standard deviation before and behind what they most
@@ -111,7 +125,7 @@ pub(super) fn of_pose(
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += along;
     // Rounding must not show which triangle it was computed from.
-    Some((covariance + covariance.transpose()) * 0.5)
+    if_finite((covariance + covariance.transpose()) * 0.5)
 }
 
 /// The covariance of `(ω, t_21)` where there is no translation: that of the rotation alone, and for a translation of which
@@ -129,7 +143,12 @@ pub(super) fn of_rotation(
     covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
-    Some(covariance)
+    if_finite(covariance)
+}
+
+/// The squares of lengths that bearings of 1e150 bring about are more than a number holds.
+fn if_finite(covariance: Matrix6<f64>) -> Option<Matrix6<f64>> {
+    covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 
 #[cfg(test)]
@@ -157,6 +176,22 @@ mod tests {
         let subset = Subset::new(&observations.columns, &poses.inliers);
         let plain = subset.equations(&motion, &LEAST_SQUARES).hessian.cholesky().unwrap().inverse() * 0.25;
         [five, plain].map(|c| c.fixed_view::<2, 2>(3, 3).determinant())
+    }
+
+    #[test]
+    fn what_is_not_determined_has_no_covariance() {
+        // Five rows, of which the last four are dependent, in units of their own.
+        let rows = Matrix5::from_fn(|i, j| ((3 * i * i + 7 * j * j * j + i * j) as f64).sin());
+        let mut dependent = rows;
+        let sum = rows.row(1) + rows.row(2) + rows.row(3);
+        dependent.row_mut(4).copy_from(&sum);
+        let units = Matrix5::from_diagonal(&[1.0, 1.0, 1e3, 1e-8, 1e-8].into());
+        let [full, singular] = [rows, dependent].map(|rows| units * rows.transpose() * rows * units);
+        let found = inverse(&full).unwrap();
+        // The rows' condition, squared, over rounding.
+        assert!((full * found - Matrix5::identity()).component_mul(&Matrix5::identity()).amax() < 1e-10);
+        assert!(inverse(&singular).is_none());
+        assert!(inverse(&Matrix5::zeros()).is_none() && inverse(&(full * f64::NAN)).is_none());
     }
 
     #[test]

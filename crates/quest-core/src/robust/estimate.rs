@@ -50,7 +50,8 @@ pub struct RunnerUp {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evidence {
-    /// Under the best rotation without translation.
+    /// Under the best rotation without translation; infinite where that leaves most of the points behind camera 2.
+    #[cfg_attr(feature = "serde", serde(with = "crate::serial::or_infinite"))]
     pub rotation_px: f64,
     /// Under the best plane; infinite where none was found.
     #[cfg_attr(feature = "serde", serde(with = "crate::serial::or_infinite"))]
