@@ -56,7 +56,7 @@ fn of_motion(
     }
     let spread = normal.square_slope / normal.slope.powi(2) - 1.0;
     let few = (1.0 + 5.0 / inliers.len() as f64 * spread) / normal.slope;
-    Some((inverse * normal.square + inverse * pull * inverse) * (few * few))
+    Some((inverse * normal.square + pull) * (few * few))
 }
 
 /// The inverse of normal equations; `None` where a change of the motion moves no point by more than rounding does.
@@ -85,13 +85,14 @@ fn probable_points(observations: &Observations, inliers: &[u32], polished: &Poli
     Columns::of_points(observations.columns.images(), points)
 }
 
-/// The mean of `ψ² J Jᵀ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
+/// The mean of `ψ² H⁻¹ J Jᵀ H⁻¹ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
 fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matrix5<f64>) -> Matrix5<f64> {
     let Polished { scored: Scored { motion, .. }, loss, limit, .. } = polished;
     let mut sum = Matrix5::zeros();
     for index in false_matches.agreeing(motion, *limit) {
         let own = One::new(false_matches, index, motion, loss, inverse);
-        sum += own.hessian * (own.square * own.weight * own.weight / (1.0 + own.leverage));
+        let turn = inverse * own.gradient * own.weight;
+        sum += turn * turn.transpose() / (1.0 + own.leverage);
     }
     sum / false_matches.len().max(1) as f64
 }
@@ -125,7 +126,7 @@ pub(super) fn of_pose(
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += along;
     // Rounding must not show which triangle it was computed from.
-    if_finite((covariance + covariance.transpose()) * 0.5)
+    Some((covariance + covariance.transpose()) * 0.5).filter(is_finite)
 }
 
 /// The covariance of `(ω, t_21)` where there is no translation: that of the rotation alone, and for a translation of which
@@ -143,12 +144,12 @@ pub(super) fn of_rotation(
     covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
-    if_finite(covariance)
+    Some(covariance).filter(is_finite)
 }
 
 /// The squares of lengths that bearings of 1e150 bring about are more than a number holds.
-fn if_finite(covariance: Matrix6<f64>) -> Option<Matrix6<f64>> {
-    covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+fn is_finite(covariance: &Matrix6<f64>) -> bool {
+    covariance.iter().all(|x| x.is_finite())
 }
 
 #[cfg(test)]

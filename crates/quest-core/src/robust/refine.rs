@@ -55,8 +55,8 @@ pub(super) struct Equations {
 pub(super) struct One {
     /// `r²`.
     pub(super) square: f64,
-    /// `J Jᵀ`.
-    pub(super) hessian: Matrix5<f64>,
+    /// `J r`.
+    pub(super) gradient: Vector5<f64>,
     /// `ψ/r` under the loss.
     pub(super) weight: f64,
     /// `ψ/r Jᵀ H⁻¹ J`.
@@ -72,10 +72,10 @@ impl One {
         loss: &impl Loss,
         inverse: &Matrix5<f64>,
     ) -> Self {
-        let Equations { cost: square, hessian, .. } =
+        let Equations { cost: square, hessian, gradient } =
             Subset::new(all, &[index]).equations(motion, &LEAST_SQUARES);
         let weight = loss.cost_and_weight(square).1;
-        Self { square, hessian, weight, leverage: weight * (inverse * hessian).trace() }
+        Self { square, gradient, weight, leverage: weight * (inverse * hessian).trace() }
     }
 }
 

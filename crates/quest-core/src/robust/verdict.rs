@@ -179,6 +179,10 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         std::mem::swap(&mut motion, second);
     }
     let scored = poses.score(motion, poses.threshold);
+    // A plane, or one of the poses of few matches, may be left with less than it takes where the threshold is next to nothing.
+    if model != Model::PureRotation && poses.inliers.len() < MIN_MATCHES {
+        return None;
+    }
     let polished = Polished { scored, ..polished };
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
