@@ -1,5 +1,6 @@
 //! The features of `quest-core` that only add: `serde` and `mint`.
 
+use std::f64::consts::FRAC_PI_4;
 use std::fmt::Debug;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -34,8 +35,8 @@ fn what_is_written_is_read_again() {
     let mut found = robust::estimate(&scene.matches, &options).unwrap();
     let text = returns::<Estimate>(&found);
     assert!(text.contains("\"model\":\"general\"") && text.contains("\"q_21\":["), "{text}");
-    found.evidence.planar_px = f64::INFINITY;
-    assert!(returns(&found).contains("\"planar_px\":null"));
+    (found.evidence.planar_px, found.evidence.rotation_px) = (f64::INFINITY, f64::INFINITY);
+    assert!(returns(&found).contains(r#""rotation_px":null,"planar_px":null"#));
     let camera = Camera::new(CameraModel::OpenCvFisheye, &[500.0, 501.0, 320.0, 240.0, 0.1, 0.0, 0.0, 0.0]);
     let text = returns(&camera.unwrap().with_size(640, 480).unwrap());
     assert!(
@@ -74,6 +75,11 @@ fn what_is_wrong_is_refused() {
         r#"{"q_21": [0, 0, 0, 0], "t_21": [0, 0, 1]}"#,
         "q_21 has the length 0, expected a unit quaternion",
     );
+    refused(r#"{"q_21": [0.93, 0, 0, 0.38], "t_21": [0, 0, 1]}"#, "expected a unit quaternion");
+    // Four decimals of an eighth of a turn are enough.
+    let read: RelativePose =
+        serde_json::from_str(r#"{"q_21": [0.9239, 0, 0, 0.3827], "t_21": [0, 0, 1]}"#).unwrap();
+    assert!((read.q_21.angle() - FRAC_PI_4).abs() < 1e-4 && (read.q_21.norm() - 1.0).abs() < 1e-15);
     refused(r#"{"q_21": [1e200, 0, 0, 0], "t_21": [0, 0, 1]}"#, "expected a unit quaternion");
     refused(r#"{"q_21": [1, 0, 0], "t_21": [0, 0, 1]}"#, "length 3, expected an array of length 4");
     let seven_digits: RelativePose =

@@ -7,8 +7,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::{Camera, CameraError, CameraModel, RelativePose};
 
-/// How far from one the length of a quaternion may be that was written with seven digits.
-const UNIT_TOLERANCE: f64 = 1e-6;
+/// How far from one the length of a quaternion may be: four written decimals stay within it, as in the files of `quest-cli`.
+const UNIT_TOLERANCE: f64 = 1e-3;
 
 /// A pose: `q_21` scalar first.
 #[derive(Serialize, Deserialize)]

@@ -18,8 +18,11 @@ pub(super) type Column<L> = [F<L>; 10];
 /// One for each monomial of [`CUBIC`](crate::solver::forms::CUBIC).
 pub(super) type Cubics<L> = [Column<L>; 20];
 
-/// The places of `xx, yy, zz, xy, xz, yz` in a matrix.
-const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+/// The six different entries of a symmetric matrix: `xx, yy, zz, xy, xz, yz`.
+type Entries<Q> = [Q; 6];
+
+/// Their places.
+const PLACES: Entries<(usize, usize)> = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// The cubics' coefficients, ready to be written to.
 #[inline(always)]
@@ -30,36 +33,16 @@ pub(super) fn empty<L: Lanes<f64>>(lanes: L) -> Cubics<L> {
 /// Fills the cubics.
 #[inline(always)]
 pub(super) fn fill<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, p: F<L>, out: &mut Cubics<L>) {
-    let [t0, t1, t2, xx, yy, zz, xy, xz, yz] = basis;
+    let [t0, t1, t2, ..] = basis;
     let t = [t0, t1, t2];
-    let (plus, minus) = (lanes.splat(1.0), lanes.splat(-1.0));
-    let minus_two = minus + minus;
-    let minus_trace = combined::<L, 3, 4>([(xx, minus), (yy, minus), (zz, minus)]);
-    let z = [
-        combined::<L, 2, 4>([(&minus_trace, minus), (xx, minus_two)]),
-        combined::<L, 2, 4>([(&minus_trace, minus), (yy, minus_two)]),
-        combined::<L, 2, 4>([(&minus_trace, minus), (zz, minus_two)]),
-        combined::<L, 1, 4>([(xy, minus_two)]),
-        combined::<L, 1, 4>([(xz, minus_two)]),
-        combined::<L, 1, 4>([(yz, minus_two)]),
-    ];
-    let [z_xx, z_yy, z_zz, z_xy, z_xz, z_yz] = &z;
-    let minus_xy = &combined::<L, 1, 4>([(z_xy, minus)]);
-    let minus_xz = &combined::<L, 1, 4>([(z_xz, minus)]);
-    let minus_yz = &combined::<L, 1, 4>([(z_yz, minus)]);
-
+    let minus = lanes.splat(-1.0);
+    let minus_trace = combined::<L, 3, 4>([(&basis[3], minus), (&basis[4], minus), (&basis[5], minus)]);
+    let z = traced(lanes, basis, &minus_trace);
+    let [xx, yy, zz, xy, xz, yz] = &z;
     let turned = [
-        products::<L, 3>(lanes, [(z_xx, t0), (z_xy, t1), (z_xz, t2)]),
-        products::<L, 3>(lanes, [(z_xy, t0), (z_yy, t1), (z_yz, t2)]),
-        products::<L, 3>(lanes, [(z_xz, t0), (z_yz, t1), (z_zz, t2)]),
-    ];
-    let a = [
-        products::<L, 2>(lanes, [(z_yy, z_zz), (minus_yz, z_yz)]),
-        products::<L, 2>(lanes, [(z_xx, z_zz), (minus_xz, z_xz)]),
-        products::<L, 2>(lanes, [(z_xx, z_yy), (minus_xy, z_xy)]),
-        products::<L, 2>(lanes, [(z_xz, z_yz), (minus_xy, z_zz)]),
-        products::<L, 2>(lanes, [(z_xy, z_yz), (minus_xz, z_yy)]),
-        products::<L, 2>(lanes, [(z_xy, z_xz), (minus_yz, z_xx)]),
+        products::<L, 3>(lanes, [(xx, t0), (xy, t1), (xz, t2)]),
+        products::<L, 3>(lanes, [(xy, t0), (yy, t1), (yz, t2)]),
+        products::<L, 3>(lanes, [(xz, t0), (yz, t1), (zz, t2)]),
     ];
     let mut squares = [turned[0]; 6];
     for (square, (i, j)) in squares.iter_mut().zip(PLACES) {
@@ -67,24 +50,64 @@ pub(super) fn fill<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, p: F<L>, out: &mut
     }
     let minus_square =
         combined::<L, 3, 10>([(&squares[0], minus), (&squares[1], minus), (&squares[2], minus)]);
-    // What is beside the trace.
-    let quarter = lanes.splat(0.25) * p * p;
-    let mut beside = squares;
-    for k in 0..3 {
-        let (b, c) = (&a[(k + 1) % 3], &a[(k + 2) % 3]);
-        beside[k] = combined::<L, 3, 10>([(&squares[k], plus), (b, quarter), (c, quarter)]);
-        beside[k + 3] = combined::<L, 2, 10>([(&squares[k + 3], plus), (&a[k + 3], -quarter)]);
-    }
-
+    let a = adjugate(lanes, &z);
+    let beside = beside_trace(lanes, &squares, &a, p);
     for (k, (i, j)) in PLACES.into_iter().enumerate() {
-        let symmetric = [(&turned[i], t[j]), (&turned[j], t[i])];
-        let [first, second] = symmetric;
+        let (first, second) = ((&turned[i], t[j]), (&turned[j], t[i]));
         set::<L, 4>(lanes, out, k, [first, second, (&minus_square, &z[k]), (&beside[k], &minus_trace)]);
     }
     set::<L, 3>(lanes, out, 6, [(&a[0], t0), (&a[3], t1), (&a[4], t2)]);
     set::<L, 3>(lanes, out, 7, [(&a[3], t0), (&a[1], t1), (&a[5], t2)]);
     set::<L, 3>(lanes, out, 8, [(&a[4], t0), (&a[5], t1), (&a[2], t2)]);
-    set::<L, 3>(lanes, out, 9, [(&a[0], z_xx), (&a[3], z_xy), (&a[4], z_xz)]);
+    set::<L, 3>(lanes, out, 9, [(&a[0], xx), (&a[3], xy), (&a[4], xz)]);
+}
+
+/// `Z = h I − 2 S`, by `−h`.
+#[inline(always)]
+fn traced<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, minus_trace: &Linear<L>) -> Entries<Linear<L>> {
+    let (minus, minus_two) = (lanes.splat(-1.0), lanes.splat(-2.0));
+    let mut z = [*minus_trace; 6];
+    for k in 0..3 {
+        z[k] = combined::<L, 2, 4>([(minus_trace, minus), (&basis[3 + k], minus_two)]);
+        z[k + 3] = combined::<L, 1, 4>([(&basis[6 + k], minus_two)]);
+    }
+    z
+}
+
+/// `A = adj Z`.
+#[inline(always)]
+fn adjugate<L: Lanes<f64>>(lanes: L, z: &Entries<Linear<L>>) -> Entries<Quadratic<L>> {
+    let minus = lanes.splat(-1.0);
+    let [xx, yy, zz, xy, xz, yz] = z;
+    let minus_xy = &combined::<L, 1, 4>([(xy, minus)]);
+    let minus_xz = &combined::<L, 1, 4>([(xz, minus)]);
+    let minus_yz = &combined::<L, 1, 4>([(yz, minus)]);
+    [
+        products::<L, 2>(lanes, [(yy, zz), (minus_yz, yz)]),
+        products::<L, 2>(lanes, [(xx, zz), (minus_xz, xz)]),
+        products::<L, 2>(lanes, [(xx, yy), (minus_xy, xy)]),
+        products::<L, 2>(lanes, [(xz, yz), (minus_xy, zz)]),
+        products::<L, 2>(lanes, [(xy, yz), (minus_xz, yy)]),
+        products::<L, 2>(lanes, [(xy, xz), (minus_yz, xx)]),
+    ]
+}
+
+/// `t tᵀ + ¼ p² (tr(A) I − A)`, by `t tᵀ`.
+#[inline(always)]
+fn beside_trace<L: Lanes<f64>>(
+    lanes: L,
+    squares: &Entries<Quadratic<L>>,
+    a: &Entries<Quadratic<L>>,
+    p: F<L>,
+) -> Entries<Quadratic<L>> {
+    let (one, quarter) = (lanes.splat(1.0), lanes.splat(0.25) * p * p);
+    let mut out = *squares;
+    for k in 0..3 {
+        let (b, c) = (&a[(k + 1) % 3], &a[(k + 2) % 3]);
+        out[k] = combined::<L, 3, 10>([(&squares[k], one), (b, quarter), (c, quarter)]);
+        out[k + 3] = combined::<L, 2, 10>([(&squares[k + 3], one), (&a[k + 3], -quarter)]);
+    }
+    out
 }
 
 /// The sum of some forms with weights.
