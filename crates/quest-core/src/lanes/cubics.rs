@@ -139,7 +139,7 @@ fn products<L: Lanes<f64>, const T: usize>(lanes: L, terms: [(&Linear<L>, &Linea
     out
 }
 
-/// Sets a cubic to the sum of three or four products of a quadratic and a linear form.
+/// Sets a cubic to the sum of some products of a quadratic and a linear form.
 #[inline(always)]
 fn set<L: Lanes<f64>, const T: usize>(
     lanes: L,
@@ -160,11 +160,8 @@ fn half<L: Lanes<f64>, const T: usize, const HALF: usize>(
     terms: [(&Quadratic<L>, &Linear<L>); T],
 ) {
     let mut sums = [lanes.splat(0.0); 10];
-    add_product::<L, HALF>(&mut sums, terms[0]);
-    add_product::<L, HALF>(&mut sums, terms[1]);
-    add_product::<L, HALF>(&mut sums, terms[2]);
-    if T > 3 {
-        add_product::<L, HALF>(&mut sums, terms[3 % T]);
+    for term in 0..T {
+        add_product::<L, HALF>(&mut sums, terms[term]);
     }
     for i in 0..10 {
         out[10 * HALF + i][row] = sums[i];
