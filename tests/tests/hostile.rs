@@ -92,6 +92,7 @@ fn estimates_are_whole_or_refused() {
             focal_lengths: [[focal_length; 2]; 2],
             max_iterations: pick(&mut rng, &[1, 8, 200]),
             min_iterations: 1,
+            max_false_alarms: pick(&mut rng, &[0.03, f64::INFINITY]),
             ..Options::default()
         };
         match robust::estimate(&matches, &options) {
@@ -114,5 +115,6 @@ fn is_whole(estimate: &Estimate) -> bool {
     poses.iter().flatten().all(is_finite)
         && numbers.iter().all(|x| x.is_finite())
         && is_covariance
+        && estimate.inlier_count >= robust::MIN_MATCHES
         && estimate.inliers.iter().filter(|is_inlier| **is_inlier).count() == estimate.inlier_count
 }

@@ -66,6 +66,10 @@ pub(crate) struct Arguments {
     /// Draw at most so many samples.
     #[arg(long, value_name = "N", default_value_t = Options::default().max_iterations)]
     max_iterations: usize,
+    /// Answer if at most so many poses as good as the best are to be expected where all matches are false; `inf` to answer
+    /// always.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = Options::default().max_false_alarms)]
+    max_false_alarms: f64,
     /// The seed of the samples.
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
@@ -125,6 +129,7 @@ impl Arguments {
         let options = Options {
             confidence: self.confidence,
             max_iterations: self.max_iterations,
+            max_false_alarms: self.max_false_alarms,
             seed: self.seed,
             index,
             solver: self.solver,

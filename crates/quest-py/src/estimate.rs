@@ -27,6 +27,9 @@ use crate::solve::{Views, solver_named};
 ///     How sure to be that a sample without outliers was seen before the search stops.
 /// min_iterations, max_iterations : int
 ///     At least and at most so many samples are drawn.
+/// max_false_alarms : float
+///     The best pose is returned if at most so many poses as good as it are to be expected where all matches are false:
+///     lower to be surer that it is none of those, infinite to have it whatever chance explains.
 /// seed : int
 ///     The same seed gives the same answer, bit for bit.
 /// index : int
@@ -66,7 +69,7 @@ use crate::solve::{Views, solver_named};
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
-    seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None, known_direction=None
+    max_false_alarms=0.03, seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None, known_direction=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
@@ -80,6 +83,7 @@ pub(crate) fn estimate(
     confidence: f64,
     min_iterations: usize,
     max_iterations: usize,
+    max_false_alarms: f64,
     seed: u64,
     index: u64,
     solver: Option<&str>,
@@ -98,6 +102,7 @@ pub(crate) fn estimate(
         confidence,
         min_iterations,
         max_iterations,
+        max_false_alarms,
         seed,
         index,
         solver,

@@ -22,7 +22,7 @@ use crate::solve::solver_named;
 ///     Pair ``i`` has the rows from ``offsets[i]`` to ``offsets[i + 1]``, the latter not included.
 /// cameras1, cameras2 : Camera, array_like of shape (3, 3), or a sequence of B of them, optional
 ///     The cameras of all pairs, or of each. ``cameras2`` is ``cameras1`` where absent.
-/// threshold, confidence, min_iterations, max_iterations, seed, solver, loss
+/// threshold, confidence, min_iterations, max_iterations, max_false_alarms, seed, solver, loss
 ///     As for ``estimate``.
 /// first_index : int
 ///     Pair ``i`` gets the answer that ``estimate`` gives for it with the same seed and ``index=first_index + i``, whatever
@@ -42,7 +42,7 @@ use crate::solve::solver_named;
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, offsets, cameras1=None, cameras2=None, *, threshold=None, confidence=0.9999, min_iterations=300,
-    max_iterations=100_000, seed=0, first_index=0, solver=None, loss="marginalised", num_threads=0
+    max_iterations=100_000, max_false_alarms=0.03, seed=0, first_index=0, solver=None, loss="marginalised", num_threads=0
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn estimate_batch(
@@ -56,6 +56,7 @@ pub(crate) fn estimate_batch(
     confidence: f64,
     min_iterations: usize,
     max_iterations: usize,
+    max_false_alarms: f64,
     seed: u64,
     first_index: u64,
     solver: Option<&str>,
@@ -77,7 +78,7 @@ pub(crate) fn estimate_batch(
     let threshold = threshold_for(cameras.is_some(), threshold)?;
     let index = first_index;
     let numbers = Options { confidence, min_iterations, max_iterations, seed, index, ..Options::default() };
-    let options = Options { threshold, solver, loss, ..numbers };
+    let options = Options { threshold, max_false_alarms, solver, loss, ..numbers };
     py.detach(|| {
         let matches = matches(&x1, &x2, &offsets, cameras.as_ref())?;
         let problems: Vec<_> = (0..pairs)

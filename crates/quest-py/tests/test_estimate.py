@@ -108,6 +108,11 @@ def test_false_matches() -> None:
     rng = np.random.default_rng(7)
     with pytest.raises(qp.NoPose, match="of 60 matches"):
         qp.estimate(rng.uniform(0, 800, (60, 2)), rng.uniform(0, 800, (60, 2)), K, max_iterations=2000)
+    x1, x2 = rng.uniform(0, 800, (2, 60, 2))
+    est = qp.estimate(x1, x2, K, max_iterations=2000, max_false_alarms=np.inf)
+    assert 5 <= est.inliers.sum() < 40
+    found = qp.estimate_batch(x1, x2, [0, 60], K, max_iterations=2000, max_false_alarms=np.inf)
+    np.testing.assert_array_equal(found.R, [est.R])
 
 
 def test_bad_input() -> None:

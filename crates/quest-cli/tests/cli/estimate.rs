@@ -92,6 +92,8 @@ fn false_matches_have_no_pose() {
     assert_eq!((run.status, &result["model"]), (1, &Value::Null));
     assert!(run.stderr.starts_with("no pose: standard input: no pose could be found"), "{}", run.stderr);
     assert!(result["reason"].as_str().unwrap().contains("of 40 matches"));
+    let (run, _) = estimated(&false_ones, &["--max-iterations", "2000", "--max-false-alarms", "inf"]);
+    assert_eq!(run.status, 0);
 }
 
 #[test]
@@ -124,6 +126,7 @@ fn bad_input_is_refused() {
         (["--threshold", "NaN"], "threshold is NaN"),
         (["--confidence", "1"], "confidence is 1"),
         (["--max-iterations", "0"], "iterations"),
+        (["--max-false-alarms", "0"], "number of false alarms is 0"),
         (["--solver", "orb"], "orb"),
     ] {
         let (run, _) = estimated(&four, &arguments);

@@ -88,7 +88,7 @@ const DIAGNOSED: usize = 300;
 /// # Errors
 /// [`EstimateError::Option`] for an impossible option, [`EstimateError::Input`] for fewer than [`MIN_MATCHES`] matches (or
 /// than the solver takes) and for matches that determine no pose, [`EstimateError::NoPose`] where the best pose
-/// agrees with no more matches than chance explains. With fewer than ten matches, of which that cannot be said, the best pose is
+/// agrees with no more matches than chance explains ([`Options::max_false_alarms`]). With fewer than ten matches, of which that cannot be said, the best pose is
 /// returned where five of them agree with it.
 pub fn estimate(matches: &[Correspondence], options: &Options) -> Result<Estimate, EstimateError> {
     estimate_with(matches, options, &Priors::default())
@@ -126,7 +126,7 @@ fn answer(
     let Some(best) = search.best else {
         return Err(no_pose(&observations, options.threshold, 0));
     };
-    verdict::conclude(&mut search, best, answer, &mut rng)
+    verdict::conclude(&mut search, best, answer, options.max_false_alarms, &mut rng)
 }
 
 /// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.

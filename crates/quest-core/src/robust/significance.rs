@@ -26,26 +26,22 @@ const WIDE: f64 = 3.0;
 /// Real solutions of a sample, on average.
 const SOLUTIONS: f64 = 4.0;
 
-/// The logarithm (base ten) of the number of false alarms that is accepted. The refinement of a motion tries others that are not
-/// counted: with 300 false matches and 100,000 samples, a number of 0.1 let sixteen poses in a thousand pass.
-const ACCEPTED: f64 = -1.5;
-
-/// Whether chance does not explain the inliers that `poses` holds, those of `motion`, found among so many samples.
-pub(super) fn is_significant(
+/// The base ten logarithm of the number of false alarms of a motion whose inliers `poses` holds, found among so many samples.
+pub(super) fn log_false_alarms(
     poses: &PoseScorer,
     motion: &Motion,
     iterations: usize,
     false_matches: &Columns,
-) -> bool {
+) -> f64 {
     let observations = poses.observations;
     let chance = chance_of_a_pixel(false_matches, motion, poses.threshold);
     let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals()[i as usize].abs()).collect();
     errors.sort_unstable_by(f64::total_cmp);
-    log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64) < ACCEPTED
+    least_log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64)
 }
 
-/// The base ten logarithm of the number of false alarms, for the inliers' errors in ascending order.
-fn log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, tried: f64) -> f64 {
+/// The same for the inliers' errors in ascending order.
+fn least_log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, tried: f64) -> f64 {
     let free = matches - 5;
     let all_samples: f64 = (0..5).map(|i| ((matches - i) as f64 / (5 - i) as f64).log10()).sum();
     let fixed = (free as f64).log10() + tried.log10().min(all_samples + SOLUTIONS.log10());
@@ -77,12 +73,12 @@ mod tests {
     #[test]
     fn false_alarms_are_counted() {
         // 5 · 252 · 4 · C(5, 5) · 0.01^5 = 5.04e-7.
-        let all = log_false_alarms(10, &[1.0; 10], 0.01, 1e9);
+        let all = least_log_false_alarms(10, &[1.0; 10], 0.01, 1e9);
         assert!((10_f64.powf(all) / 5.04e-7 - 1.0).abs() < 1e-9, "{all}");
         // Ten of a hundred are no sign of anything, thirty are, and ten that agree closely.
-        assert!(log_false_alarms(100, &[1.0; 10], 0.01, 1e5) > 0.0);
-        assert!(log_false_alarms(100, &[1.0; 30], 0.01, 1e5) < -10.0);
-        assert!(log_false_alarms(100, &[1e-4; 10], 0.01, 1e5) < -10.0);
-        assert!(log_false_alarms(100, &[1.0; 5], 0.01, 1e5).is_infinite());
+        assert!(least_log_false_alarms(100, &[1.0; 10], 0.01, 1e5) > 0.0);
+        assert!(least_log_false_alarms(100, &[1.0; 30], 0.01, 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1e-4; 10], 0.01, 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1.0; 5], 0.01, 1e5).is_infinite());
     }
 }

@@ -194,6 +194,9 @@ fn false_matches_have_no_pose() {
         let refused = estimate(&scene.matches, &limits).unwrap_err();
         let EstimateError::NoPose { inliers, matches } = refused else { panic!("{refused}") };
         assert!(matches == points && inliers < points, "{refused}");
+        let anyhow = Options { max_false_alarms: f64::INFINITY, ..limits.clone() };
+        let estimate = estimate(&scene.matches, &anyhow).unwrap();
+        assert_eq!(estimate.inlier_count, inliers);
     }
 }
 
@@ -281,6 +284,9 @@ fn bad_input_is_refused_at_the_door() {
     }
     for confidence in [0.0, 1.0, f64::NAN] {
         assert!(error(Options { confidence, ..options() }).contains("confidence"));
+    }
+    for max_false_alarms in [0.0, -1.0, f64::NAN] {
+        assert!(error(Options { max_false_alarms, ..options() }).contains("false alarms"));
     }
     assert!(error(Options { max_iterations: 0, ..options() }).contains("iterations"));
     assert!(error(Options { focal_lengths: [[0.0; 2]; 2], ..options() }).contains("focal length"));

@@ -19,7 +19,7 @@ use super::pose_score::{PoseScorer, Scored};
 use super::refine::{FINE, Subset, refine};
 use super::score::MANY;
 use super::search::Search;
-use super::significance::{self, is_significant};
+use super::significance::{self, log_false_alarms};
 use super::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
 use crate::solver::motion::Motion;
 use crate::structure::translation_direction;
@@ -57,6 +57,7 @@ pub(super) fn conclude(
     search: &mut Search,
     best: Scored,
     answer: Answer,
+    max_false_alarms: f64,
     rng: &mut ChaCha8Rng,
 ) -> Result<Estimate, EstimateError> {
     let iterations = search.iterations;
@@ -71,11 +72,10 @@ pub(super) fn conclude(
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
     let false_matches = significance::false_matches(observations);
-    let agrees = match observations.len() {
-        ..MANY => inliers >= MIN_MATCHES,
-        _ => is_significant(poses, &polished.scored.motion, iterations, &false_matches),
-    };
-    if !agrees {
+    let is_chance = observations.len() >= MANY
+        && log_false_alarms(poses, &polished.scored.motion, iterations, &false_matches)
+            > max_false_alarms.log10();
+    if inliers < MIN_MATCHES || is_chance {
         return Err(no_pose(observations, poses.threshold, inliers));
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
@@ -179,16 +179,16 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         std::mem::swap(&mut motion, second);
     }
     let scored = poses.score(motion, poses.threshold);
-    // A plane, or one of the poses of few matches, may be left with less than it takes where the threshold is next to nothing.
-    if model != Model::PureRotation && poses.inliers.len() < MIN_MATCHES {
-        return None;
-    }
     let polished = Polished { scored, ..polished };
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold).powi(2);
         let mut squares = observations.framed(&poses.inliers).square_errors(&r_21).into_iter();
         poses.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
+    }
+    // A plane, a rotation, or one of the poses of few matches may be left with less than it takes.
+    if poses.inliers.len() < MIN_MATCHES {
+        return None;
     }
     let inliers = poses.inliers.clone();
     let noise = Noise { sigma, threshold: poses.threshold, false_matches };
