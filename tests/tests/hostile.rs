@@ -1,6 +1,8 @@
 //! Matches of all kinds of degenerate scenes, with noise and focal lengths of every size: no panic, no number that is none, no
 //! covariance that is not one.
 
+use std::f64::consts::PI;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use quest_core::robust::{self, Estimate, Options};
 use quest_core::solver::{Kinds, SolverName};
@@ -110,11 +112,12 @@ fn is_whole(estimate: &Estimate) -> bool {
     let poses = [Some(estimate.pose), estimate.runner_up.map(|other| other.pose)];
     let numbers = [estimate.noise_px, estimate.score, estimate.evidence.general_px];
     let variances = estimate.covariance.symmetric_eigenvalues();
-    // Of rank five but for the variance of the length: rounding may take an eigenvalue below zero.
-    let is_covariance = variances.min() >= -1e-12 * variances.max();
+    // Rounding may take a small eigenvalue below zero.
+    let is_covariance = variances.min() >= -1e-14 * variances.max();
     poses.iter().flatten().all(is_finite)
         && numbers.iter().all(|x| x.is_finite())
         && is_covariance
+        && estimate.covariance.fixed_view::<3, 3>(0, 0).trace() <= PI * PI
         && estimate.inlier_count >= robust::MIN_MATCHES
         && estimate.inliers.iter().filter(|is_inlier| **is_inlier).count() == estimate.inlier_count
 }

@@ -105,7 +105,8 @@ pub(super) fn of_pose(
     size: Length,
     false_matches: &Columns,
 ) -> Option<Matrix6<f64>> {
-    let five = of_motion(observations, inliers, polished, false_matches)?;
+    // As the square of a root no variance is negative, however much of the others cancels.
+    let five = of_motion(observations, inliers, polished, false_matches)?.cholesky()?.unpack();
     let motion = &polished.scored.motion;
     let tangent = tangent_basis(&motion.direction);
     let slope = size.slope(&tangent);
@@ -118,9 +119,10 @@ pub(super) fn of_pose(
         }
         jacobian.fixed_view_mut::<3, 1>(3, k).copy_from(&column);
     }
-    let mut covariance = jacobian * five * jacobian.transpose();
+    let root = jacobian * five;
+    let mut covariance = root * root.transpose();
     // To second order the length is |t| (1 + x + x²), as if the motion had its inverse, x² having twice the square of the variance.
-    let by_motion = slope.dot(&(five * slope));
+    let by_motion = five.tr_mul(&slope).norm_squared();
     let second_order = 2.0 * by_motion * (by_motion / size.value.powi(2)).min(1.0);
     let along = motion.direction * motion.direction.transpose() * (size.variance + second_order);
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);

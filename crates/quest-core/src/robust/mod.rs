@@ -87,9 +87,9 @@ const DIAGNOSED: usize = 300;
 ///
 /// # Errors
 /// [`EstimateError::Option`] for an impossible option, [`EstimateError::Input`] for fewer than [`MIN_MATCHES`] matches (or
-/// than the solver takes) and for matches that determine no pose, [`EstimateError::NoPose`] where the best pose
-/// agrees with no more matches than chance explains ([`Options::max_false_alarms`]). With fewer than ten matches, of which that cannot be said, the best pose is
-/// returned where five of them agree with it.
+/// than the solver takes) and for matches that determine no pose, or leave its rotation open, [`EstimateError::NoPose`] where
+/// the best pose agrees with no more matches than chance explains ([`Options::max_false_alarms`]). With fewer than ten matches,
+/// of which that cannot be said, the best pose is returned where five of them agree with it.
 pub fn estimate(matches: &[Correspondence], options: &Options) -> Result<Estimate, EstimateError> {
     estimate_with(matches, options, &Priors::default())
 }

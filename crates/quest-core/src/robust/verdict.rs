@@ -1,6 +1,8 @@
 //! From the best pose of the search to the estimate: the last refinement, the other pose of a plane, the model, the length of
 //! the translation, the covariance.
 
+use std::f64::consts::PI;
+
 use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
@@ -102,7 +104,7 @@ pub(super) fn conclude(
         answer,
     };
     let estimate = assemble(poses, &found);
-    // A whole family of poses is no pose.
+    // A whole family of poses is no pose, and none is known where the rotation may be any.
     estimate.ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))
 }
 
@@ -197,6 +199,9 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
         _ => covariance::of_pose(observations, &inliers, &polished, size, false_matches),
     }?;
+    if covariance.fixed_view::<3, 3>(0, 0).trace().sqrt() > PI {
+        return None;
+    }
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {
         mask[observations.order[i as usize]] = true;
