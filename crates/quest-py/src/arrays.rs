@@ -87,6 +87,21 @@ struct Real<'a, 'py> {
 
 impl<'a, 'py> Real<'a, 'py> {
     fn new(name: &'a str, given: &Bound<'py, PyAny>, expected: &'a str) -> PyResult<Self> {
+        let array = if given.is_exact_instance_of::<PyUntypedArray>() {
+            given.cast::<PyUntypedArray>()?.clone()
+        } else {
+            Self::viewed(name, given, expected)?
+        };
+        // Complex numbers would lose their imaginary part, and NumPy would parse strings.
+        if !b"biuf".contains(&array.dtype().kind()) {
+            let dtype = array.dtype();
+            return Err(PyTypeError::new_err(format!("{name} has the dtype {dtype}, expected {expected}")));
+        }
+        Ok(Self { name, expected, array })
+    }
+
+    /// As NumPy views it.
+    fn viewed(name: &str, given: &Bound<'py, PyAny>, expected: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
         let py = given.py();
         let numpy = py.import("numpy")?;
         // The array would come without its mask.
@@ -100,13 +115,7 @@ impl<'a, 'py> Real<'a, 'py> {
             }
             ShapeMismatch::new_err(format!("{name}: {}, expected {expected}", error.value(py)))
         })?;
-        let array = array.cast_into::<PyUntypedArray>()?;
-        // Complex numbers would lose their imaginary part, and NumPy would parse strings.
-        if !b"biuf".contains(&array.dtype().kind()) {
-            let dtype = array.dtype();
-            return Err(PyTypeError::new_err(format!("{name} has the dtype {dtype}, expected {expected}")));
-        }
-        Ok(Self { name, expected, array })
+        Ok(array.cast_into()?)
     }
 
     fn rows<const D: usize>(&self) -> PyResult<Vec<[f64; D]>> {
@@ -118,6 +127,12 @@ impl<'a, 'py> Real<'a, 'py> {
 
     /// All numbers, row after row.
     fn numbers(&self) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+        if let Ok(array) = self.array.cast::<PyArrayDyn<f64>>()
+            && array.is_c_contiguous()
+            && array.data().is_aligned()
+        {
+            return Ok(array.try_readonly()?);
+        }
         let numpy = self.array.py().import("numpy")?;
         // C: in C order. A: aligned. NumPy copies only where one of them, or the dtype, differs.
         let array = numpy.call_method1("require", (&self.array, "f8", ["C", "A"]))?;

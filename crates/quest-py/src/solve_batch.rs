@@ -81,6 +81,9 @@ fn solve<const D: usize>(
         let message = format!("x1 has {} samples and x2 has {}, expected as many", x1.len(), x2.len());
         return Err(ShapeMismatch::new_err(message));
     }
+    if x1.len() <= MIN_SHARE {
+        return solve_part(0, x1, x2, &make);
+    }
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     let share = x1.len().div_ceil(threads).max(MIN_SHARE);
     let parts: Vec<_> = thread::scope(|scope| {
