@@ -11,7 +11,7 @@ use quest_benches::statistics::{mean, percentile, sorted};
 use quest_benches::{SEED, parallel};
 use quest_core::robust::{self, Estimate, Model, Options};
 use quest_core::simulate::{
-    FOCAL_LENGTH, Layout, Motion, Scene, SceneError, SceneOptions, is_inside_image, pixel_to_plane,
+    Angle, FOCAL_LENGTH, Layout, Motion, Scene, SceneError, SceneOptions, is_inside_image, pixel_to_plane,
     plane_to_pixel,
 };
 use quest_core::{Correspondence, RelativePose, disambiguation};
@@ -211,18 +211,21 @@ impl Arguments {
             "0.5 px, 100 matches, threshold 1.5 px: |t| against the true parallax, scenes that are not called a rotation\n"
         );
         println!(
-            "| parallax | outliers | scenes | called rotation | error of the length, median | its bias, median |"
+            "| turned by up to | parallax | outliers | scenes | called rotation | error of the length, median | its bias, \
+             median |"
         );
-        println!("|---|---|---|---|---|---|");
-        for outliers in [0.0, 0.3] {
+        println!("|---|---|---|---|---|---|---|");
+        // The more a camera turns, the smaller is the part of the image that both see.
+        for (degrees, outliers) in [30.0_f64, 20.0, 10.0].into_iter().flat_map(|d| [(d, 0.0), (d, 0.3)]) {
+            let angle = Angle::UpTo(degrees.to_radians());
             for parallax in [0.003, 0.01, 0.03, 0.1, 0.3] {
-                let scene = SceneOptions { motion: Motion::Parallax(parallax), ..noisy(100) };
+                let scene = SceneOptions { motion: Motion::Parallax(parallax), angle, ..noisy(100) };
                 let all = self.estimates(&scene, outliers, |_, scene, found| {
                     found.map(|found| (found.model, found.pose.t_21.norm() / scene.truth.t_21.norm() - 1.0))
                 })?;
                 let moved = || all.iter().flatten().filter(|e| e.0 != Model::PureRotation).map(|e| e.1);
                 println!(
-                    "| {parallax} | {:.0} % | {} | {:.1} % | {:.1} % | {:+.1} % |",
+                    "| {degrees}° | {parallax} | {:.0} % | {} | {:.1} % | {:.1} % | {:+.1} % |",
                     100.0 * outliers,
                     moved().count(),
                     share(&all, |e| e.is_some_and(|e| e.0 == Model::PureRotation)),
