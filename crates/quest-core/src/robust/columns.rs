@@ -14,7 +14,7 @@ use crate::solver::motion::Motion;
 /// Matches that are worked on at once.
 const WIDTH: usize = 8;
 
-/// Rays closer than this, in pixels of both views, have no depth.
+/// Rays closer than this multiple of the threshold, in pixels of both views, have no depth.
 const DISPARITY: f64 = 2.0;
 
 /// The poses of an essential matrix: of a motion, with the opposite translation, and the same of its twisted partner.
@@ -25,6 +25,8 @@ pub(super) const POSES: usize = 4;
 pub(super) struct Columns {
     /// The two views, both planes or both spheres.
     images: [Image; 2],
+    /// The inlier threshold in pixels.
+    threshold: f64,
     all: [Vec<f64>; 6],
 }
 
@@ -54,6 +56,7 @@ impl Columns {
     /// The points of matches, on the plane `z = 1` or on the unit sphere.
     pub(super) fn of_points(
         images: [Image; 2],
+        threshold: f64,
         points: impl ExactSizeIterator<Item = [Vector3<f64>; 2]>,
     ) -> Self {
         let mut all: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(points.len()));
@@ -63,7 +66,7 @@ impl Columns {
                 column.push(*x);
             }
         }
-        Self { images, all }
+        Self { images, threshold, all }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -84,6 +87,11 @@ impl Columns {
         let [x1, y1, z1, x2, y2, z2] = self.all.each_ref().map(|column| column[index]);
         let [d1, d2] = self.inverse_scales().map(Vector3::from);
         [Vector3::new(x1, y1, z1).component_mul(&d1), Vector3::new(x2, y2, z2).component_mul(&d2)]
+    }
+
+    /// The inlier threshold in pixels.
+    pub(super) fn threshold(&self) -> f64 {
+        self.threshold
     }
 
     pub(super) fn is_sphere(&self) -> bool {
@@ -128,7 +136,7 @@ impl Columns {
                 }
             }
         }
-        Self { images: self.images, all }
+        Self { images: self.images, threshold: self.threshold, all }
     }
 
     /// The matches within `limit` pixels of a motion that are in front of both cameras.
@@ -202,7 +210,7 @@ impl View {
             ],
             squares: [d1, d2].map(|d| d.map(|d| d * d)),
             curvature: columns.curvature(),
-            parallel: DISPARITY * DISPARITY * columns.square_angle_of_pixel(),
+            parallel: (DISPARITY * columns.threshold).powi(2) * columns.square_angle_of_pixel(),
         }
     }
 
@@ -272,7 +280,7 @@ impl View {
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn sides(&self, bc: f64, tb: f64, tc: f64, bb: f64, cc: f64) -> u32 {
-        // |b × c|² / (|b|² |c|²); the difference has the digits that are needed at two pixels.
+        // |b × c|² / (|b|² |c|²); the difference has the digits that are needed at a pixel.
         let is_far = (bc > 0.0) & (bb * cc - bc * bc < self.parallel * (bb * cc));
         let (first, second) = (bc * tb - tc * bb > 0.0, tb * cc - bc * tc > 0.0);
         u32::from(is_far | (first & second)) | u32::from(is_far | (!first & !second)) << 1
@@ -295,7 +303,7 @@ mod tests {
         };
         let matches: Vec<_> =
             if is_sphere { scene.matches.iter().map(unit).collect() } else { scene.matches };
-        let all = Observations::new(&matches, (0..13).collect(), [[FOCAL_LENGTH; 2]; 2]);
+        let all = Observations::new(&matches, (0..13).collect(), [[FOCAL_LENGTH; 2]; 2], 1.0);
         assert_eq!(all.columns.is_sphere(), is_sphere);
         (all, scene.truth)
     }

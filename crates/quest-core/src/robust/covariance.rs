@@ -73,8 +73,8 @@ fn inverse(hessian: &Matrix5<f64>) -> Option<Matrix5<f64>> {
 /// The inliers, exactly as the motion sees them, with inverse depths one standard deviation before and behind what they most
 /// probably are: of both together the mean and the square are right.
 fn probable_points(observations: &Observations, inliers: &[u32], polished: &Polished) -> Columns {
-    let motion = &polished.scored.motion;
-    let depths = InverseDepth::all(&observations.columns, motion, inliers);
+    let (motion, columns) = (&polished.scored.motion, &observations.columns);
+    let depths = InverseDepth::all(columns, motion, inliers);
     let usual = Usual::new(&depths);
     let points = (0..2 * depths.len()).map(|k| {
         let depth = &depths[k / 2];
@@ -82,7 +82,7 @@ fn probable_points(observations: &Observations, inliers: &[u32], polished: &Poli
         let rho = if k % 2 == 0 { mean + deviation } else { mean - deviation };
         [depth.x1, motion.q_21 * depth.x1 + motion.direction * rho]
     });
-    Columns::of_points(observations.columns.images(), points)
+    Columns::of_points(columns.images(), columns.threshold(), points)
 }
 
 /// The mean of `ψ² H⁻¹ J Jᵀ H⁻¹ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
@@ -169,8 +169,8 @@ mod tests {
     /// The determinant of the covariance of the direction, as it is given and by the normal equations alone.
     fn determinants(matches: &[Correspondence], motion: Motion) -> [f64; 2] {
         let order = (0..matches.len()).collect();
-        let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2]);
-        let mut poses = PoseScorer::new(&observations, 1.5, Score::default());
+        let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
+        let mut poses = PoseScorer::new(&observations, Score::default());
         let scored = poses.score(motion, 1.5);
         assert_eq!(poses.inliers.len(), matches.len());
         let polished = Polished { scored, sigma: 0.5, loss: HeavyTailed::new(2.5), limit: 4.5 };

@@ -121,8 +121,8 @@ mod tests {
     /// as it is without chance.
     fn refined(scene: &Scene, start: Motion) -> (Vec<u32>, [Motion; 2]) {
         let order = (0..scene.matches.len()).collect();
-        let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2]);
-        let mut poses = PoseScorer::new(&observations, 1.5, Loss::default());
+        let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
+        let mut poses = PoseScorer::new(&observations, Loss::default());
         let mut polished = polish(&mut poses, start);
         let before = polished.scored.motion;
         poses.score(before, 1.5);

@@ -156,7 +156,7 @@ mod tests {
         let point2 = motion.q_21 * x1 * 5.0 + motion.direction;
         let points = [x1, point2 / point2.z];
         let differentiated = |points: [Vector3<f64>; 2], motion: &Motion| {
-            let columns = Columns::of_points([Image::Plane([1.0; 2]); 2], [points].into_iter());
+            let columns = Columns::of_points([Image::Plane([1.0; 2]); 2], 1.0, [points].into_iter());
             InverseDepth::new(&columns, motion, 0).differentiated(motion)
         };
         let [one, two] = differentiated(points, &motion);

@@ -80,7 +80,6 @@ impl BothDepths {
 pub(super) struct Noise<'a> {
     /// In pixels.
     pub(super) sigma: f64,
-    pub(super) threshold: f64,
     pub(super) false_matches: &'a Columns,
 }
 
@@ -101,7 +100,8 @@ pub(super) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
     if (clear.len() as f64) < MOST * all.len() as f64 {
         return by_inverse_depths(&all);
     }
-    let Noise { sigma, threshold, false_matches } = *noise;
+    let Noise { sigma, false_matches } = *noise;
+    let threshold = false_matches.threshold();
     let of_false = |index: u32| BothDepths::new(false_matches, index as usize, None, motion, sigma);
     let agreeing = false_matches.agreeing(motion, threshold).into_iter().map(of_false);
     let outliers = (observations.len() - inliers.len()) as f64 * some.len() as f64 / inliers.len() as f64;

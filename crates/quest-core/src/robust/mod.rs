@@ -121,18 +121,18 @@ fn answer(
     let mut rng = sampling::generator(options.seed, options.index);
     let mut order: Vec<usize> = (0..matches.len()).collect();
     order.shuffle(&mut rng);
-    let observations = Observations::new(matches, order, options.focal_lengths);
+    let observations = Observations::new(matches, order, options.focal_lengths, options.threshold);
     let mut search = search(&observations, options, priors, rng.clone());
     let Some(best) = search.best else {
-        return Err(no_pose(&observations, options.threshold, 0));
+        return Err(no_pose(&observations, 0));
     };
     verdict::conclude(&mut search, best, answer, options.max_false_alarms, &mut rng)
 }
 
 /// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.
-fn no_pose(observations: &Observations, threshold: f64, inliers: usize) -> EstimateError {
+fn no_pose(observations: &Observations, inliers: usize) -> EstimateError {
     let some = &observations.matches[..observations.len().min(DIAGNOSED)];
-    let otherwise = if observations.is_line(some, threshold) {
+    let otherwise = if observations.is_line(some) {
         InputError::Degenerate(Degeneracy::Collinear).into()
     } else {
         EstimateError::NoPose { inliers, matches: observations.len() }

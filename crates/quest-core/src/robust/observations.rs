@@ -59,8 +59,13 @@ pub(super) struct Observations {
 }
 
 impl Observations {
-    /// The matches in this order, with the focal lengths of both views.
-    pub(super) fn new(given: &[Correspondence], order: Vec<usize>, focal_lengths: [[f64; 2]; 2]) -> Self {
+    /// The matches in this order, with the focal lengths of both views and the inlier threshold in pixels.
+    pub(super) fn new(
+        given: &[Correspondence],
+        order: Vec<usize>,
+        focal_lengths: [[f64; 2]; 2],
+        threshold: f64,
+    ) -> Self {
         let matches: Vec<_> = order.iter().map(|&i| given[i]).collect();
         let is_plane = matches.iter().all(|m| {
             let off = |z: f64, length: f64| (z * length - 1.0).abs() < ON_PLANE;
@@ -69,7 +74,7 @@ impl Observations {
         let images = focal_lengths
             .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
         let points = matches.iter().map(|m| [*m.bearing1(), *m.bearing2()]);
-        let columns = Columns::of_points(images, points);
+        let columns = Columns::of_points(images, threshold, points);
         Self { matches, order, columns }
     }
 
@@ -82,8 +87,8 @@ impl Observations {
     }
 
     /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
-    pub(super) fn is_line(&self, some: &[Correspondence], threshold: f64) -> bool {
-        let images = self.columns.images();
+    pub(super) fn is_line(&self, some: &[Correspondence]) -> bool {
+        let (images, threshold) = (self.columns.images(), self.columns.threshold());
         nearly_on_a_line(some, images.map(|image| threshold / image.square_focal_length().sqrt()))
     }
 

@@ -45,8 +45,9 @@ pub(super) struct PoseScorer<'a> {
 }
 
 impl<'a> PoseScorer<'a> {
-    pub(super) fn new(observations: &'a Observations, threshold: f64, loss: Loss) -> Self {
+    pub(super) fn new(observations: &'a Observations, loss: Loss) -> Self {
         let loss = if observations.len() < MANY { Loss::Truncated } else { loss };
+        let threshold = observations.columns.threshold();
         Self { observations, threshold, loss, look: Look::default(), inliers: Vec::new() }
     }
 

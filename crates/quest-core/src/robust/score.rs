@@ -56,8 +56,8 @@ pub(super) struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     /// `threshold` in pixels.
-    pub(super) fn new(observations: &'a Observations, threshold: f64, loss: Loss) -> Self {
-        let reach = REACH * threshold;
+    pub(super) fn new(observations: &'a Observations, loss: Loss) -> Self {
+        let reach = REACH * observations.columns.threshold();
         let matches = &observations.matches;
         let kernel = lanes::Scorer::new();
         if observations.is_sphere() {

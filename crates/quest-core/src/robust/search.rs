@@ -81,7 +81,7 @@ impl<'a> Search<'a> {
         options: &Options,
         direction: Option<KnownDirection>,
     ) -> Self {
-        let Options { threshold, loss, solver, .. } = *options;
+        let Options { loss, solver, .. } = *options;
         Self {
             observations,
             solver,
@@ -89,8 +89,8 @@ impl<'a> Search<'a> {
             essentials: Essentials::new(),
             samples: Vec::new(),
             direction,
-            scorer: Scorer::new(observations, threshold, loss),
-            poses: PoseScorer::new(observations, threshold, loss),
+            scorer: Scorer::new(observations, loss),
+            poses: PoseScorer::new(observations, loss),
             best_hypothesis: observations.len() as f64,
             best: None,
             all: Vec::new(),

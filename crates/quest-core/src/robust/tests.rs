@@ -111,6 +111,36 @@ fn an_exact_rotation_needs_no_translation() {
 }
 
 #[test]
+fn the_unit_of_the_threshold_does_not_matter() {
+    for (index, motion) in
+        (0..40).flat_map(|i| [0.1, 0.03, 0.0].map(|parallax| (i, SceneMotion::Parallax(parallax))))
+    {
+        let (scene, _) = scene(&SceneOptions { motion, ..noisy(100) }, 0.3, 300 + index);
+        let as_bearing = |m: &Correspondence| {
+            Correspondence::from_bearings((*m.bearing1()).into(), (*m.bearing2()).into()).unwrap()
+        };
+        let bearings: Vec<_> = scene.matches.iter().map(as_bearing).collect();
+        for matches in [&scene.matches, &bearings] {
+            let in_pixels = estimate(matches, &options()).unwrap();
+            let threshold = options().threshold / FOCAL_LENGTH;
+            let in_radians = Options { threshold, focal_lengths: [[1.0; 2]; 2], ..options() };
+            let in_radians = estimate(matches, &in_radians).unwrap();
+            // The search may come to the same optimum on another way, to its last step.
+            assert_eq!(
+                (in_radians.model, &in_radians.inliers),
+                (in_pixels.model, &in_pixels.inliers),
+                "{index}"
+            );
+            assert!(in_radians.pose.rotation_error(&in_pixels.pose) < 1e-5, "{index}");
+            assert!((in_radians.pose.t_21 - in_pixels.pose.t_21).norm() < 1e-4, "{index}");
+            assert!((in_radians.noise_px * FOCAL_LENGTH / in_pixels.noise_px - 1.0).abs() < 1e-3, "{index}");
+            let covariance = in_radians.covariance - in_pixels.covariance;
+            assert!(covariance.norm() < 1e-2 * in_pixels.covariance.norm(), "{index}");
+        }
+    }
+}
+
+#[test]
 fn the_seed_and_the_index_decide_and_nothing_else() {
     let (scene, _) = scene(&noisy(100), 0.5, 60);
     let with = |seed, index| estimate(&scene.matches, &Options { seed, index, ..options() }).unwrap();

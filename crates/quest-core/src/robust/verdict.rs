@@ -78,7 +78,7 @@ pub(super) fn conclude(
         && log_false_alarms(poses, &polished.scored.motion, iterations, &false_matches)
             > max_false_alarms.log10();
     if inliers < MIN_MATCHES || is_chance {
-        return Err(no_pose(observations, poses.threshold, inliers));
+        return Err(no_pose(observations, inliers));
     }
     let verdict = choose(poses, &polished.scored.motion.q_21, plane.as_ref(), polished.sigma);
     let is_plane = verdict.model == Model::Planar && verdict.is_exact_plane;
@@ -91,7 +91,7 @@ pub(super) fn conclude(
     // A rotation alone is determined by the points of a line, a translation is not.
     let some = &poses.inliers[..inliers.min(DIAGNOSED)];
     let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
-    if verdict.model != Model::PureRotation && observations.is_line(&some, poses.threshold) {
+    if verdict.model != Model::PureRotation && observations.is_line(&some) {
         return Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()));
     }
     let found = Found {
@@ -193,7 +193,7 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         return None;
     }
     let inliers = poses.inliers.clone();
-    let noise = Noise { sigma, threshold: poses.threshold, false_matches };
+    let noise = Noise { sigma, false_matches };
     let size = length(observations, &motion, &inliers, &noise);
     let covariance = match model {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
