@@ -89,6 +89,16 @@ fn options() -> Options {
     Options { threshold: 1.5, focal_lengths: [[FOCAL_LENGTH; 2]; 2], ..Options::default() }
 }
 
+/// An estimate beside the truth.
+struct Moved {
+    model: Model,
+    /// The error of the length of the translation as a share of it.
+    length: f64,
+    /// Whether the translation points to the right side, and that of the runner-up.
+    is_right: bool,
+    second: Option<bool>,
+}
+
 /// The errors of rotation and of the direction of translation, in degrees.
 fn errors(pose: &RelativePose, truth: &RelativePose) -> [f64; 2] {
     [pose.rotation_error(truth), pose.translation_error(truth).unwrap_or(0.0)].map(f64::to_degrees)
@@ -208,29 +218,43 @@ impl Arguments {
 
     fn length(&self) -> Result<(), SceneError> {
         println!(
-            "0.5 px, 100 matches, threshold 1.5 px: |t| against the true parallax, scenes that are not called a rotation\n"
+            "0.5 px, 100 matches, threshold 1.5 px: |t| against the true parallax, and its direction, of scenes that are not \
+             called a rotation\n"
         );
         println!(
             "| turned by up to | parallax | outliers | scenes | called rotation | error of the length, median | its bias, \
-             median |"
+             median | off by more than 45° | of those, with the right runner-up | a runner-up |"
         );
-        println!("|---|---|---|---|---|---|---|");
+        println!("|---|---|---|---|---|---|---|---|---|---|");
         // The more a camera turns, the smaller is the part of the image that both see.
         for (degrees, outliers) in [30.0_f64, 20.0, 10.0].into_iter().flat_map(|d| [(d, 0.0), (d, 0.3)]) {
             let angle = Angle::UpTo(degrees.to_radians());
             for parallax in [0.003, 0.01, 0.03, 0.1, 0.3] {
                 let scene = SceneOptions { motion: Motion::Parallax(parallax), angle, ..noisy(100) };
                 let all = self.estimates(&scene, outliers, |_, scene, found| {
-                    found.map(|found| (found.model, found.pose.t_21.norm() / scene.truth.t_21.norm() - 1.0))
+                    let is_right = |pose: &RelativePose| errors(pose, &scene.truth)[1] < 45.0;
+                    found.map(|found| Moved {
+                        model: found.model,
+                        length: found.pose.t_21.norm() / scene.truth.t_21.norm() - 1.0,
+                        is_right: is_right(&found.pose),
+                        second: found.runner_up.map(|second| is_right(&second.pose)),
+                    })
                 })?;
-                let moved = || all.iter().flatten().filter(|e| e.0 != Model::PureRotation).map(|e| e.1);
+                let is_rotation = |e: &Moved| e.model == Model::PureRotation;
+                let moved: Vec<_> = all.iter().flatten().filter(|e| !is_rotation(e)).collect();
+                let wrong: Vec<_> = moved.iter().filter(|e| !e.is_right).collect();
+                let lengths = || moved.iter().map(|e| e.length);
                 println!(
-                    "| {degrees}° | {parallax} | {:.0} % | {} | {:.1} % | {:.1} % | {:+.1} % |",
+                    "| {degrees}° | {parallax} | {:.0} % | {} | {:.1} % | {:.1} % | {:+.1} % | {:.1} % | {} of {} | {:.1} % |",
                     100.0 * outliers,
-                    moved().count(),
-                    share(&all, |e| e.is_some_and(|e| e.0 == Model::PureRotation)),
-                    100.0 * median(moved().map(f64::abs)),
-                    100.0 * median(moved()),
+                    moved.len(),
+                    share(&all, |e| e.as_ref().is_some_and(is_rotation)),
+                    100.0 * median(lengths().map(f64::abs)),
+                    100.0 * median(lengths()),
+                    share(&moved, |e| !e.is_right),
+                    wrong.iter().filter(|e| e.second == Some(true)).count(),
+                    wrong.len(),
+                    share(&moved, |e| e.second.is_some()),
                 );
             }
         }

@@ -98,8 +98,8 @@ impl RunnerUp {
 pub(crate) struct Estimate {
     /// str : Which model the matches support.
     ///
-    /// ``"general"``, ``"planar"`` (there may be a second pose, the runner-up) or ``"pure_rotation"`` (no translation that
-    /// stands clear of the noise: ``t`` is the small vector that is left).
+    /// ``"general"``, ``"planar"`` or ``"pure_rotation"`` (no translation that stands clear of the noise: ``t`` is the small
+    /// vector that is left). Of a plane, and where the camera hardly moved, there may be a second pose, the runner-up.
     #[pyo3(get)]
     model: String,
     pose: Pose,

@@ -81,7 +81,8 @@ pub struct Estimate {
     pub score: f64,
     /// Samples drawn.
     pub iterations: usize,
-    /// The pose that explains the matches nearly as well, where there is one.
+    /// The pose that explains the matches nearly as well, where there is one: of a plane, of few matches, and where the parallax
+    /// is so small that noise decides between two.
     pub runner_up: Option<RunnerUp>,
     /// How well each model fits.
     pub evidence: Evidence,

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::columns::{Look, POSES, is_in_front};
 use super::observations::Observations;
+use super::plane::CAP;
 use super::score::{MANY, REACH, cost};
 use super::widest::{Work, widest};
 use crate::lanes::Loss;
@@ -70,6 +71,16 @@ impl<'a> PoseScorer<'a> {
     pub(super) fn score(&mut self, motion: Motion, limit: f64) -> Scored {
         self.observations.columns.look(&motion.essential(), &motion, &mut self.look);
         self.finish(motion, 0, limit)
+    }
+
+    /// The sum of the squares of a pose's residuals at this noise, none above [`CAP`].
+    pub(super) fn misfit(&mut self, motion: &Motion, sigma: f64) -> f64 {
+        self.observations.columns.look(&motion.essential(), motion, &mut self.look);
+        let square = |(i, r): (usize, &f64)| {
+            let square = (r / sigma).powi(2).min(CAP);
+            if self.look.is_in_front(i, 0) { square } else { CAP }
+        };
+        self.look.residuals.iter().enumerate().map(square).sum()
     }
 
     /// The residuals of the pose that was scored last, in pixels.

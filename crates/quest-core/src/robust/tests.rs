@@ -86,6 +86,27 @@ fn planes_are_recognised_and_have_two_poses() {
 }
 
 #[test]
+fn a_small_parallax_may_have_two_minima() {
+    let (mut wrong, mut second_is_right) = (0, 0);
+    for index in 0..200 {
+        for parallax in [0.01, 0.2] {
+            let motion = SceneMotion::Parallax(parallax);
+            let (scene, _) = scene(&SceneOptions { motion, ..noisy(100) }, 0.3, 1_000 + index);
+            let found = estimate(&scene.matches, &options()).unwrap();
+            let second = found.runner_up.filter(|_| found.model == Model::General);
+            let is_near = |pose: &RelativePose| errors(pose, &scene.truth)[1] < 45.0;
+            if parallax > 0.1 {
+                assert!(is_near(&found.pose) && second.is_none(), "{index}");
+            } else if found.model == Model::General && !is_near(&found.pose) {
+                wrong += 1;
+                second_is_right += usize::from(second.is_some_and(|second| is_near(&second.pose)));
+            }
+        }
+    }
+    assert!(wrong < 20 && 3 * second_is_right > wrong, "{second_is_right} of {wrong}");
+}
+
+#[test]
 fn a_camera_that_turns_in_place_has_a_rotation_and_no_translation() {
     let turning = SceneOptions { motion: SceneMotion::PureRotation, ..noisy(100) };
     for index in 40..50 {

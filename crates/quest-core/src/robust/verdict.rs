@@ -15,7 +15,7 @@ use super::loss::GemanMcClure;
 use super::model::{Verdict, choose};
 use super::observations::Observations;
 use super::options::EstimateError;
-use super::plane::{self, Plane};
+use super::plane::{self, CAP, Plane};
 use super::polish::{FEWEST, Polished, SCALE, polish};
 use super::pose_score::{PoseScorer, Scored};
 use super::refine::{FINE, Subset, refine};
@@ -30,6 +30,9 @@ use crate::{Degeneracy, InputError, RelativePose};
 /// Poses closer than this in rotation and in the direction of translation (radians) are the same answer.
 const SAME: f64 = 0.02;
 const SAME_DIRECTION: f64 = 0.1;
+
+/// Another minimum whose translation is nearer than this (radians) is one that the covariance speaks of.
+const ELSEWHERE: f64 = 0.5;
 
 /// The runner-up has at least this share of the inliers of the best, and the best of the runner-up's.
 const NEARLY_AS_WELL: f64 = 0.8;
@@ -172,7 +175,7 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     match model {
         Model::Planar => (motion, second) = both_of_plane(poses, others, &motion, verdict.is_exact_plane),
         Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
-        Model::General => {}
+        Model::General => second = as_likely(poses, others, &polished),
     }
     if model != Model::PureRotation && observations.len() < MANY {
         second = second_of_few(of_few, &motion);
@@ -255,6 +258,29 @@ fn both_of_plane(
     } else {
         (first, Some(other))
     }
+}
+
+/// Another motion that noise may have made the worse one: where the parallax is small the cost has a minimum on either side of
+/// the plane that the points are nearest to.
+fn as_likely(poses: &mut PoseScorer, others: &[Alternative], polished: &Polished) -> Option<Motion> {
+    let best = &polished.scored.motion;
+    let is_elsewhere = |other: &Motion| other.direction.angle(&best.direction) > ELSEWHERE;
+    let refined = others.iter().map(|a| a.refined.motion).filter(|motion| !is_same(motion, best));
+    let mut second: Option<Scored> = None;
+    for mut motion in refined {
+        let limit = poses.misfit(best, polished.sigma) + CAP;
+        if poses.misfit(&motion, polished.sigma) > limit {
+            continue;
+        }
+        // It was refined over some of its inliers, and may have been on the way to the same minimum.
+        poses.score(motion, polished.limit);
+        let subset = Subset::new(&poses.observations.columns, &poses.inliers);
+        refine(&subset, &mut motion, &polished.loss, FINE, STEPS);
+        let other = poses.best_pose(&motion.essential(), poses.threshold);
+        let least = second.map_or(f64::INFINITY, |second| second.cost);
+        second = other.filter(|other| is_elsewhere(&other.motion) && other.cost < least).or(second);
+    }
+    second.map(|second| second.motion)
 }
 
 /// How far one motion is from another, in radians of rotation and of direction together.
