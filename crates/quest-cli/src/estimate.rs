@@ -56,8 +56,8 @@ Exit status:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: InputOptions,
-    /// Matches with a Sampson error below this are inliers: in pixels, 1 by default; without cameras in units of the
-    /// plane z = 1, where it has to be given.
+    /// Matches with a Sampson error below this are inliers: two to three standard deviations of the noise, in pixels, 1 by
+    /// default; without cameras in units of the plane z = 1, where it has to be given.
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     threshold: Option<f64>,
     /// How sure to be that a sample without outliers was seen.

@@ -21,8 +21,8 @@ use crate::solve::{Views, solver_named};
 /// camera1, camera2 : Camera or array_like of shape (3, 3), optional
 ///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
 /// threshold : float, optional
-///     Matches with a Sampson error below this are inliers, in pixels, 1 by default. Without cameras in units of
-///     the plane z = 1, in radians for bearings; it has to be given then.
+///     Matches with a Sampson error below this are inliers: two to three standard deviations of the points' noise, in
+///     pixels, 1 by default. Without cameras in units of the plane z = 1, in radians for bearings; it has to be given then.
 /// confidence : float
 ///     How sure to be that a sample without outliers was seen before the search stops.
 /// min_iterations, max_iterations : int

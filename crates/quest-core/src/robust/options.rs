@@ -15,7 +15,8 @@ use crate::{Camera, InputError, RelativePose};
     serde(default, deny_unknown_fields)
 )]
 pub struct Options {
-    /// Matches whose Sampson error is below this are inliers, in pixels of [`focal_lengths`](Self::focal_lengths).
+    /// Matches whose Sampson error is below this are inliers, in pixels of [`focal_lengths`](Self::focal_lengths): two to three
+    /// standard deviations of the points' noise. Below that the noise, and with it the covariance, is measured too small.
     pub threshold: f64,
     /// `fx, fy` of view 1 and of view 2, in pixels. With all of them 1 the threshold is in units of the plane `z = 1`, or
     /// in radians for bearings.
