@@ -41,7 +41,8 @@ Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
   The model is general, planar or pure_rotation (no translation that stands clear of the noise);
   the evidence is the median residual of the inliers under each. Of a plane, and where the camera
-  hardly moved, there may be a second pose that the noise does not rule out, the runner-up. Matches that determine no pose, such as points on a line, are bad input;
+  hardly moved, there may be a second pose that the noise does not rule out, the runner-up.
+  Matches that determine no pose, such as points on a line, are bad input;
   among JSON Lines their model is degenerate, with a reason and without a pose.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
   The same seed gives the same answer; each line of JSON Lines has random numbers of its own.

@@ -69,7 +69,8 @@ use crate::solve::{Views, solver_named};
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
-    max_false_alarms=0.03, seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None, known_direction=None
+    max_false_alarms=0.03, seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None,
+    known_direction=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]

@@ -42,7 +42,8 @@ use crate::solve::solver_named;
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, offsets, cameras1=None, cameras2=None, *, threshold=None, confidence=0.9999, min_iterations=300,
-    max_iterations=100_000, max_false_alarms=0.03, seed=0, first_index=0, solver=None, loss="marginalised", num_threads=0
+    max_iterations=100_000, max_false_alarms=0.03, seed=0, first_index=0, solver=None, loss="marginalised",
+    num_threads=0
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn estimate_batch(

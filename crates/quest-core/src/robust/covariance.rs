@@ -15,6 +15,8 @@
 //!
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion};
 
 use super::columns::Columns;
@@ -128,7 +130,7 @@ pub(super) fn of_pose(
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += along;
     // Rounding must not show which triangle it was computed from.
-    Some((covariance + covariance.transpose()) * 0.5).filter(is_finite)
+    Some((covariance + covariance.transpose()) * 0.5).filter(says_something)
 }
 
 /// The covariance of `(ω, t_21)` where there is no translation: that of the rotation alone, and for a translation of which
@@ -146,12 +148,13 @@ pub(super) fn of_rotation(
     covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
-    Some(covariance).filter(is_finite)
+    Some(covariance).filter(says_something)
 }
 
-/// The squares of lengths that bearings of 1e150 bring about are more than a number holds.
-fn is_finite(covariance: &Matrix6<f64>) -> bool {
-    covariance.iter().all(|x| x.is_finite())
+/// Whether the rotation is known to half a turn. And the squares of lengths that bearings of 1e150 bring about are more than a
+/// number holds.
+fn says_something(covariance: &Matrix6<f64>) -> bool {
+    covariance.iter().all(|x| x.is_finite()) && covariance.fixed_view::<3, 3>(0, 0).trace() <= PI * PI
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ pub(super) fn refine_without_chance(poses: &mut PoseScorer, polished: &mut Polis
         refine(&Subset::new(&observations.columns, &kept), &mut motion, &polished.loss, FINE, STEPS);
         chance = doubtful(observations, &kept, &motion, polished);
     }
-    polished.scored = poses.best_pose(&motion.essential(), poses.threshold).unwrap_or(polished.scored);
+    polished.scored = poses.best_pose(&motion.essential(), poses.threshold()).unwrap_or(polished.scored);
     polished.sigma = sigma(poses, &polished.scored.motion);
 }
 

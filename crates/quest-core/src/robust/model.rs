@@ -70,7 +70,7 @@ pub(super) fn choose(
     let observations = poses.observations;
     let inliers = &poses.inliers[..poses.inliers.len().min(ENOUGH)];
     let noise = sigma;
-    let sigma = noise.max(LEAST_NOISE * poses.threshold);
+    let sigma = noise.max(LEAST_NOISE * poses.threshold());
     let framed = observations.framed(inliers);
     let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();

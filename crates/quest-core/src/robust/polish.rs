@@ -40,7 +40,7 @@ pub(super) struct Polished {
 /// Refines a pose by least squares over its inliers, measures the noise, and refines it with a loss of that scale. The
 /// inliers that [`PoseScorer`] holds afterwards are those of the result.
 pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
-    let threshold = poses.threshold;
+    let threshold = poses.threshold();
     let mut best = poses.score(start, threshold);
     let mut motion = start;
     if poses.inliers.len() >= FEWEST {
@@ -68,7 +68,7 @@ pub(super) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
 }
 
 fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
-    if let Some(scored) = poses.best_pose(&motion.essential(), poses.threshold)
+    if let Some(scored) = poses.best_pose(&motion.essential(), poses.threshold())
         && scored.cost < best.cost
     {
         *best = scored;
@@ -77,6 +77,6 @@ fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
 
 /// The noise of the inliers of a pose; leaves its inliers in `poses`.
 pub(super) fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
-    poses.score(*motion, poses.threshold);
-    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals()[i as usize]), poses.threshold)
+    poses.score(*motion, poses.threshold());
+    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals()[i as usize]), poses.threshold())
 }

@@ -36,8 +36,6 @@ pub(super) struct Scored {
 #[derive(Debug)]
 pub(super) struct PoseScorer<'a> {
     pub(super) observations: &'a Observations,
-    /// The inlier threshold in pixels.
-    pub(super) threshold: f64,
     loss: Loss,
     /// The residuals of the pose that was scored last, in pixels, and on which side of the cameras its points are.
     look: Look,
@@ -48,8 +46,7 @@ pub(super) struct PoseScorer<'a> {
 impl<'a> PoseScorer<'a> {
     pub(super) fn new(observations: &'a Observations, loss: Loss) -> Self {
         let loss = if observations.len() < MANY { Loss::Truncated } else { loss };
-        let threshold = observations.columns.threshold();
-        Self { observations, threshold, loss, look: Look::default(), inliers: Vec::new() }
+        Self { observations, loss, look: Look::default(), inliers: Vec::new() }
     }
 
     /// The best of the four poses of an essential matrix. [`Self::inliers`] are those within `limit` pixels.
@@ -73,14 +70,18 @@ impl<'a> PoseScorer<'a> {
         self.finish(motion, 0, limit)
     }
 
-    /// The sum of the squares of a pose's residuals at this noise, none above [`CAP`].
-    pub(super) fn misfit(&mut self, motion: &Motion, sigma: f64) -> f64 {
-        self.observations.columns.look(&motion.essential(), motion, &mut self.look);
+    /// The inlier threshold in pixels.
+    pub(super) fn threshold(&self) -> f64 {
+        self.observations.columns.threshold()
+    }
+
+    /// The sum of the squares of the residuals of the pose that was scored last, at this noise, none above [`CAP`].
+    pub(super) fn misfit(&self, sigma: f64) -> f64 {
         let square = |(i, r): (usize, &f64)| {
             let square = (r / sigma).powi(2).min(CAP);
             if self.look.is_in_front(i, 0) { square } else { CAP }
         };
-        self.look.residuals.iter().enumerate().map(square).sum()
+        self.residuals().iter().enumerate().map(square).sum()
     }
 
     /// The residuals of the pose that was scored last, in pixels.
@@ -90,7 +91,7 @@ impl<'a> PoseScorer<'a> {
 
     /// The one of the four poses with most matches in front of both cameras.
     fn vote(&self, limit: f64) -> usize {
-        let limit = limit.max(REACH * self.threshold);
+        let limit = limit.max(REACH * self.threshold());
         let residuals = self.residuals();
         let voters = (0..residuals.len()).filter(|&i| residuals[i].abs() < limit);
         let mut votes = [0_usize; POSES];
@@ -105,14 +106,14 @@ impl<'a> PoseScorer<'a> {
 
     /// The score of a pose of the motion that was looked at, `motion` itself.
     fn finish(&mut self, motion: Motion, pose: usize, limit: f64) -> Scored {
-        let reach = REACH * self.threshold;
+        let reach = REACH * self.threshold();
         let judging = Judging {
             look: &self.look,
             pose,
             loss: self.loss,
             inverse_reach: 1.0 / reach,
             judged: limit.max(reach),
-            near: SUPPORT * self.threshold,
+            near: SUPPORT * self.threshold(),
         };
         let (cost, support) = widest(judging);
         self.inliers.resize(self.look.residuals.len(), 0);

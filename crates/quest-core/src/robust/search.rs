@@ -234,12 +234,12 @@ impl<'a> Search<'a> {
 
     /// The limit of the inliers that local optimisation looks at, in pixels.
     fn width(&self) -> f64 {
-        REACH * self.poses.threshold
+        REACH * self.poses.threshold()
     }
 
     /// Refines a pose that has just been scored over its inliers.
     fn optimise(&mut self, start: Scored) -> Scored {
-        let loss = Biweight::new(WIDTH * self.poses.threshold);
+        let loss = Biweight::new(WIDTH * self.poses.threshold());
         let mut best = start;
         for _ in 0..ROUNDS {
             let count = self.poses.inliers.len().min(MATCHES);

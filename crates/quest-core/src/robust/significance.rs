@@ -34,7 +34,7 @@ pub(super) fn log_false_alarms(
     false_matches: &Columns,
 ) -> f64 {
     let observations = poses.observations;
-    let chance = chance_of_a_pixel(false_matches, motion, poses.threshold);
+    let chance = chance_of_a_pixel(false_matches, motion, poses.threshold());
     let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals()[i as usize].abs()).collect();
     errors.sort_unstable_by(f64::total_cmp);
     least_log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64)

@@ -1,8 +1,6 @@
 //! From the best pose of the search to the estimate: the last refinement, the other pose of a plane, the model, the length of
 //! the translation, the covariance.
 
-use std::f64::consts::PI;
-
 use nalgebra::UnitQuaternion;
 use rand_chacha::ChaCha8Rng;
 
@@ -72,7 +70,7 @@ pub(super) fn conclude(
     let plane = plane::fit(poses.observations, &polished.scored.motion, &poses.inliers, polished.sigma, rng);
     let mut others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     replace(poses, &mut polished, &mut others);
-    poses.score(polished.scored.motion, poses.threshold);
+    poses.score(polished.scored.motion, poses.threshold());
     refine_without_chance(poses, &mut polished);
     let (observations, inliers) = (poses.observations, poses.inliers.len());
     // Of few matches chance cannot be told from truth: the best pose is returned, if a sample's worth of them agree with it.
@@ -89,7 +87,7 @@ pub(super) fn conclude(
         && let Some(plane) = plane.over_all(observations, &poses.inliers, polished.sigma)
     {
         others = alternatives(poses, &plane, &polished);
-        poses.score(polished.scored.motion, poses.threshold);
+        poses.score(polished.scored.motion, poses.threshold());
     }
     // A rotation alone is determined by the points of a line, a translation is not.
     let some = &poses.inliers[..inliers.min(DIAGNOSED)];
@@ -130,7 +128,7 @@ struct Alternative {
 }
 
 fn alternatives(poses: &mut PoseScorer, plane: &Plane, polished: &Polished) -> Vec<Alternative> {
-    let wide = WIDE * poses.threshold;
+    let wide = WIDE * poses.threshold();
     let loss = GemanMcClure::new(SCALE * polished.sigma);
     let mut all = Vec::new();
     for motion in plane.motions.iter().flatten() {
@@ -169,25 +167,26 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
     let Found { polished, others, of_few, verdict, false_matches, iterations, answer } = *found;
     let observations = poses.observations;
     let sigma = polished.sigma;
-    let model = verdict.model;
+    let (model, is_few) = (verdict.model, observations.len() < MANY);
     let mut motion = polished.scored.motion;
     let mut second = None;
     match model {
         Model::Planar => (motion, second) = both_of_plane(poses, others, &motion, verdict.is_exact_plane),
         Model::PureRotation => motion = still(observations, &poses.inliers, verdict.q_21),
-        Model::General => second = as_likely(poses, others, &polished),
+        Model::General if !is_few => second = as_likely(poses, others, &polished),
+        Model::General => {}
     }
-    if model != Model::PureRotation && observations.len() < MANY {
+    if model != Model::PureRotation && is_few {
         second = second_of_few(of_few, &motion);
     }
     if let (Answer::Other, Some(second)) = (answer, &mut second) {
         std::mem::swap(&mut motion, second);
     }
-    let scored = poses.score(motion, poses.threshold);
+    let scored = poses.score(motion, poses.threshold());
     let polished = Polished { scored, ..polished };
     if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
-        let limit = (NEAR_POINT * poses.threshold).powi(2);
+        let limit = (NEAR_POINT * poses.threshold()).powi(2);
         let mut squares = observations.framed(&poses.inliers).square_errors(&r_21).into_iter();
         poses.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
     }
@@ -202,9 +201,6 @@ fn assemble(poses: &mut PoseScorer, found: &Found) -> Option<Estimate> {
         Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, &inliers, sigma, size),
         _ => covariance::of_pose(observations, &inliers, &polished, size, false_matches),
     }?;
-    if covariance.fixed_view::<3, 3>(0, 0).trace().sqrt() > PI {
-        return None;
-    }
     let mut mask = vec![false; observations.len()];
     for &i in &inliers {
         mask[observations.order[i as usize]] = true;
@@ -248,7 +244,7 @@ fn both_of_plane(
         other.map(|other| other.of_plane.motion).filter(|other| !is_same(other, &own.of_plane.motion));
     let Some(other) = other else { return (first, None) };
     let [in_first, in_other] = [first, other].map(|motion| {
-        poses.score(motion, poses.threshold);
+        poses.score(motion, poses.threshold());
         poses.inliers.len() as f64
     });
     if in_other < NEARLY_AS_WELL * in_first {
@@ -265,18 +261,21 @@ fn both_of_plane(
 fn as_likely(poses: &mut PoseScorer, others: &[Alternative], polished: &Polished) -> Option<Motion> {
     let best = &polished.scored.motion;
     let is_elsewhere = |other: &Motion| other.direction.angle(&best.direction) > ELSEWHERE;
-    let refined = others.iter().map(|a| a.refined.motion).filter(|motion| !is_same(motion, best));
+    let mut refined =
+        others.iter().map(|a| a.refined.motion).filter(|motion| !is_same(motion, best)).peekable();
+    refined.peek()?;
+    poses.score(*best, polished.limit);
+    let limit = poses.misfit(polished.sigma) + CAP;
     let mut second: Option<Scored> = None;
     for mut motion in refined {
-        let limit = poses.misfit(best, polished.sigma) + CAP;
-        if poses.misfit(&motion, polished.sigma) > limit {
+        poses.score(motion, polished.limit);
+        if poses.misfit(polished.sigma) > limit {
             continue;
         }
         // It was refined over some of its inliers, and may have been on the way to the same minimum.
-        poses.score(motion, polished.limit);
         let subset = Subset::new(&poses.observations.columns, &poses.inliers);
         refine(&subset, &mut motion, &polished.loss, FINE, STEPS);
-        let other = poses.best_pose(&motion.essential(), poses.threshold);
+        let other = poses.best_pose(&motion.essential(), poses.threshold());
         let least = second.map_or(f64::INFINITY, |second| second.cost);
         second = other.filter(|other| is_elsewhere(&other.motion) && other.cost < least).or(second);
     }
@@ -309,7 +308,7 @@ fn second_of_few(all: &[Scored], best: &Motion) -> Option<Motion> {
 }
 
 fn runner_up(poses: &mut PoseScorer, motion: Motion, noise: &Noise) -> RunnerUp {
-    let scored = poses.score(motion, poses.threshold);
+    let scored = poses.score(motion, poses.threshold());
     let size = length(poses.observations, &scored.motion, &poses.inliers, noise);
     RunnerUp {
         pose: with_length(&scored.motion, size),
