@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Correspondence;
-use crate::algebra::two::{TwoVectors, times};
+use crate::algebra::vectors::two::{TwoVectors, times};
 
 /// A rotation `F` of view 2 that takes the direction of the translation to the third axis.
 ///

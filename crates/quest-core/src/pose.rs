@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::Correspondence;
-use crate::algebra::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// Two rays closer than this (the sine of their angle) are parallel to rounding: their depths are noise.
 pub(crate) const PARALLEL: f64 = 8.0 * f64::EPSILON;

@@ -15,7 +15,7 @@ use std::array::from_fn;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::{smallest_eigenvector_3, smallest_eigenvectors_3};
-use crate::algebra::two::{
+use crate::algebra::vectors::two::{
     Two, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled, side_by_side,
     unit_quaternions,
 };

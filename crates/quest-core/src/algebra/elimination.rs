@@ -2,7 +2,7 @@
 
 use nalgebra::ComplexField;
 
-use super::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// Brings the first `R` columns of an `R × C` matrix to the identity, by row operations with partial
 /// pivoting, for the rows from `keep` on; the rows above are spent on the way and left as they are.

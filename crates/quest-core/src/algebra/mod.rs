@@ -6,11 +6,10 @@
 pub(crate) mod cholesky;
 pub(crate) mod eigenvalues;
 pub(crate) mod elimination;
-
 pub(crate) mod monomials;
 pub(crate) mod null_space;
 pub(crate) mod number;
 pub(crate) mod polynomial;
 pub(crate) mod symmetric;
 pub(crate) mod tridiagonal;
-pub(crate) mod two;
+pub(crate) mod vectors;

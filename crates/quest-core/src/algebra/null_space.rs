@@ -1,6 +1,6 @@
 //! The null space of a wide matrix by Householder reflections.
 
-use super::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// An orthonormal basis of the vectors orthogonal to the `R` rows of `a`, and the smallest pivot over the largest: how
 /// far the rows are from dependent.

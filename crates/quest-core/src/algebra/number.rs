@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, RangeInclusive, Sub};
 
 use nalgebra::Complex;
 
-use super::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// Sums of squares of numbers whose squares lose nothing either.
 const RANGE: RangeInclusive<f64> = 1e-100..=1e100;

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::number::Number;
-use super::two::{Two, TwoVectors, cross, dot};
+use crate::algebra::vectors::two::{Two, TwoVectors, cross, dot};
 
 /// Enough for a double root, where the convergence is linear.
 const MAX_STEPS: usize = 60;

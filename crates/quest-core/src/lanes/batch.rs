@@ -1,18 +1,18 @@
 //! Samples in, essential matrices out.
 
-use super::cubics::{self, Cubics};
-use super::elimination::reduce;
 use super::essentials::Essentials;
-use super::frame::{Frame, frame};
-use super::geometry::{Vector3, dot, product, scaled};
-use super::instructions::{Instructions, Task, Token};
-use super::isolation::{self, Cells, Grid, MAX_ROOTS, Tables};
-use super::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
-use super::motion::Motion;
-use super::null_space::{Basis, null_space};
-use super::resultant::Resultant;
-use super::roots::{self, Root};
-use super::twice::{Twice, TwiceLanes, twice};
+use crate::algebra::vectors::instructions::{Instructions, Task, Token};
+use crate::algebra::vectors::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
+use crate::algebra::vectors::twice::{Twice, TwiceLanes, twice};
+use crate::lanes::stages::cubics::{self, Cubics};
+use crate::lanes::stages::elimination::reduce;
+use crate::lanes::stages::frame::{Frame, frame};
+use crate::lanes::stages::geometry::{Vector3, dot, product, scaled};
+use crate::lanes::stages::isolation::{self, Cells, Grid, MAX_ROOTS, Tables};
+use crate::lanes::stages::motion::Motion;
+use crate::lanes::stages::null_space::{Basis, null_space};
+use crate::lanes::stages::resultant::Resultant;
+use crate::lanes::stages::roots::{self, Root};
 use crate::solver::{Kinds, PoseSolver, Quest};
 use crate::{Candidates, Correspondence};
 

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::solver::essential::{decompose, twisted};
-use crate::solver::shortlist::rank;
+use crate::solver::shared::essential::{decompose, twisted};
+use crate::solver::shared::shortlist::rank;
 use crate::structure::with_depths;
 use crate::{Candidate, CandidateKind, Candidates, Correspondence};
 

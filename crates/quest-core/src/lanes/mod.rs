@@ -51,7 +51,7 @@
 //! roots are taken slot by slot, as many slots as the lane with the most roots needs, and the others compute there with
 //! harmless numbers that are not kept. An iteration ends when no lane needs it any more, and what has arrived does not move.
 //!
-//! The lanes are those of `lane.rs`: `vector.rs` (AVX2, AVX-512) and `sse2.rs` by pulp, `portable.rs` for other processors;
+//! The lanes are those of `algebra::vectors`: `vector.rs` (AVX2, AVX-512) and `sse2.rs` by pulp, `portable.rs` for other processors;
 //! `twice.rs` takes two roots of every sample at once.
 #![expect(
     clippy::inline_always,
@@ -59,29 +59,13 @@
 )]
 
 mod batch;
-mod cubics;
-mod elimination;
 mod essentials;
-mod frame;
-mod geometry;
-mod instructions;
-mod isolation;
-mod lane;
-mod motion;
-mod null_space;
-mod portable;
-mod resultant;
-mod roots;
 mod score;
-#[cfg(target_arch = "x86_64")]
-mod sse2;
+mod stages;
 #[cfg(test)]
 mod test;
-mod twice;
-#[cfg(target_arch = "x86_64")]
-mod vector;
 
+pub use crate::algebra::vectors::instructions::Instructions;
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
-pub use instructions::Instructions;
 pub use score::{BearingMatches, ImageMatches, Loss, MatchColumns, Real, Score, Scorer, Stop, UnknownLoss};

@@ -14,15 +14,15 @@
 //! ```
 //!
 //! # Steps
-//! 1. The matches are permuted once and written in columns of pixels (`observations`).
+//! 1. The matches are permuted once and written in columns of pixels (`data`).
 //! 2. Random samples are solved, their essential matrices scored over all matches and dropped as soon as they are
-//!    most likely worse than the best (`sampling`, `score`); the best are scored as poses, with the depths of their points
-//!    (`pose_score`), and refined over their inliers (`search`), until enough samples have been drawn (`stopping`).
-//! 3. The best pose is refined over all of its inliers with the noise that they show (`polish`, `refine`, `noise`).
-//! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`plane`). The best is refined once
-//!    more without the matches that agree with it by chance (`doubt`).
-//! 5. Whether chance explains the inliers (`significance`), and which model they support (`model`).
-//! 6. The length of the translation and the covariance (`inverse_depth`, `length`, `covariance`).
+//!    most likely worse than the best (`search::sampling`, `search::search_score`); the best are scored as poses, with the depths of their points
+//!    (`search::pose_score`), and refined over their inliers, until enough samples have been drawn (`search::stopping`).
+//! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`).
+//! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`conclude::plane`). The best is refined once
+//!    more without the matches that agree with it by chance (`conclude::chance_inliers`).
+//! 5. Whether chance explains the inliers (`conclude::false_alarms`), and which model they support (`conclude::model`).
+//! 6. The length of the translation and the covariance (`conclude::length`, `conclude::covariance`).
 //!
 //! # Noise
 //! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
@@ -33,33 +33,15 @@
 )]
 
 mod batch;
-mod columns;
-mod covariance;
-mod doubt;
+mod conclude;
+mod data;
 mod estimate;
-mod framed;
-mod inverse_depth;
-mod length;
-mod loss;
-mod model;
-mod noise;
-mod observations;
 mod options;
-mod plane;
-mod polish;
-mod pose_score;
 mod refine;
-mod sampling;
-mod score;
 mod search;
-mod significance;
-mod stopping;
 #[cfg(test)]
 mod tests;
 mod third_view;
-mod transfer;
-mod verdict;
-mod widest;
 
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -70,12 +52,12 @@ pub use options::{EstimateError, KnownDirection, Options, Priors};
 pub use third_view::{ThirdView, estimate_with_third_view};
 
 use crate::degeneracy::diagnose;
-use crate::solver::motion::Motion;
+use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, Degeneracy, InputError};
-use observations::Observations;
-use sampling::Sampler;
+use conclude::Answer;
+use data::observations::Observations;
+use search::sampling::{self, Sampler};
 use search::{Limits, Search};
-use verdict::Answer;
 
 /// Fewer matches than this have no pose.
 pub const MIN_MATCHES: usize = 5;
@@ -126,7 +108,7 @@ fn answer(
     let Some(best) = search.best else {
         return Err(no_pose(&observations, 0));
     };
-    verdict::conclude(&mut search, best, answer, options.max_false_alarms, &mut rng)
+    conclude::conclude(&mut search, best, answer, options.max_false_alarms, &mut rng)
 }
 
 /// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.

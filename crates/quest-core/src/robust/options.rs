@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::observations::Observations;
 use crate::lanes::Loss;
+use crate::robust::data::observations::Observations;
 use crate::solver::SolverName;
 use crate::{Camera, InputError, RelativePose};
 

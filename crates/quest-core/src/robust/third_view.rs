@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::verdict::Answer;
 use super::{Estimate, EstimateError, Options, Priors, answer};
 use crate::disambiguation::{Choice, choose};
+use crate::robust::conclude::Answer;
 use crate::{Correspondence, RelativePose};
 
 /// Points that both pairs have to share.

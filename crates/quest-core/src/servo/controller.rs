@@ -1,7 +1,7 @@
 //! From an image to a command: estimator, law, guards, limits.
 
-use super::estimate::{Estimate, HoldReason, PoseEstimator};
 use super::{ControlLaw, Limits, Twist};
+use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator};
 
 /// Where the features are to stay in the image, on the plane z = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -44,38 +44,29 @@
 //! the same unknown unit in the whole run, and a proportional law works with it. Normalised by the depths of both views the
 //! unit changes on the way; with the unit norm of an essential matrix there is nothing that goes to zero.
 //!
-pub mod closed_loop;
 mod controller;
-pub mod depth_filter;
-pub mod differential_drive;
-mod estimate;
-mod filter_options;
-mod first_images;
-mod fit;
-pub mod free_camera;
-mod imaging;
-mod law;
-pub mod per_frame;
-pub mod plant;
-mod reference;
-pub mod scenario;
-mod search;
-mod source;
+mod estimators;
+mod laws;
+mod simulation;
 #[cfg(test)]
 mod tests;
 mod twist;
 
+pub use estimators::{depth_filter, per_frame};
+pub use laws::{differential_drive, free_camera};
+pub use simulation::{closed_loop, plant, scenario};
+
 pub use closed_loop::{Record, World};
 pub use controller::{Border, Safety, Servo, Step};
 pub use depth_filter::DepthFilter;
+pub use depth_filter::fit::Plane;
+pub use depth_filter::options::FilterOptions;
 pub use differential_drive::{DifferentialDriveLaw, PlanarPose};
-pub use estimate::{Estimate, HoldReason, PoseEstimator};
-pub use filter_options::FilterOptions;
-pub use fit::Plane;
+pub use estimators::estimate::{Estimate, HoldReason, PoseEstimator};
+pub use estimators::source::PoseSource;
 pub use free_camera::FreeCameraLaw;
-pub use imaging::Disturbances;
-pub use law::ControlLaw;
+pub use laws::law::ControlLaw;
 pub use per_frame::{Choice, Length, PerFrame};
 pub use plant::{DifferentialDrive, FreeCamera, Plant};
-pub use source::PoseSource;
+pub use simulation::imaging::Disturbances;
 pub use twist::{Limits, Twist};

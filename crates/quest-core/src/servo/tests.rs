@@ -2,8 +2,8 @@
 
 mod hostile;
 
-use super::scenario::{self, Features};
 use super::*;
+use crate::servo::simulation::scenario::{self, Features};
 use crate::solver::SolverName;
 use crate::{Candidates, RelativePose};
 use rand_chacha::ChaCha8Rng;

@@ -1,38 +1,15 @@
 //! The pose solvers, one file each, behind one small trait.
 
-mod aligned;
-mod consensus;
-mod cubics;
-pub mod eight_point;
-pub(crate) mod essential;
-mod five_point;
-pub(crate) mod forms;
-mod gram;
-mod hidden_variable;
-pub mod homography;
-pub mod kneip;
-pub mod kukelova;
-mod least_squares;
-pub mod li_hartley;
-mod moments;
-pub(crate) mod motion;
-pub mod nister;
-mod normalisation;
-mod one_line;
+mod many_matches;
+mod published;
+mod quaternions;
 pub mod quest;
-pub mod quest_eigen;
-mod refining;
-pub mod relinearization;
-mod resultant;
-pub(crate) mod shortlist;
-mod split;
-pub mod stewenius;
-mod trace_cubics;
-mod twenty;
-mod two_descents;
-mod two_motions;
+pub(crate) mod shared;
 
 use std::str::FromStr;
+
+pub use published::{eight_point, homography, kneip, kukelova, li_hartley, nister, stewenius};
+pub use quaternions::{quest_eigen, relinearization};
 
 pub use eight_point::EightPoint;
 pub use homography::Homography;

@@ -6,7 +6,7 @@ use nalgebra::{Complex, ComplexField};
 
 use super::lr::hessenberg_eigenvalues;
 use super::pairs;
-use crate::algebra::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// A matrix in Hessenberg form, and the way back to its own eigenvectors.
 pub(crate) struct Hessenberg<const N: usize> {

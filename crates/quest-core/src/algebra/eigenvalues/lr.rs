@@ -5,7 +5,7 @@ use std::array::from_fn;
 use nalgebra::Complex;
 
 use super::pairs;
-use crate::algebra::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// Sweeps a single eigenvalue may take before the matrix is given up; about three are usual.
 const MAX_SWEEPS: usize = 60;

@@ -1,9 +1,26 @@
 //! Intervals with one root each: found by trisection with the counts of a Sturm chain, narrowed by a safeguarded Laguerre iteration.
 
 use super::MAX_STEPS;
-use super::real::RealRoots;
 use super::sturm::{Chain, End};
-use crate::algebra::two::Two;
+use crate::algebra::vectors::two::Two;
+
+/// The real roots that were found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RealRoots<const N: usize> {
+    pub(super) values: [f64; N],
+    pub(super) len: usize,
+    /// Whether all of them were told apart and refined.
+    pub(crate) certain: bool,
+    /// Whether rounding may have moved roots on or off the line: two of them, real or not, are close, or the chain has lost its
+    /// digits on the way.
+    pub(crate) close: bool,
+}
+
+impl<const N: usize> RealRoots<N> {
+    pub(crate) fn as_slice(&self) -> &[f64] {
+        &self.values[..self.len]
+    }
+}
 
 /// An interval with one root.
 #[derive(Clone, Copy, Debug, Default)]

@@ -8,8 +8,9 @@ mod complex;
 mod real;
 mod sturm;
 
+pub(crate) use bracket::RealRoots;
 pub(crate) use complex::complex_roots;
-pub(crate) use real::{RealRoots, real_roots};
+pub(crate) use real::real_roots;
 
 /// Steps to refine a root; four are usual.
 const MAX_STEPS: usize = 80;

@@ -1,6 +1,6 @@
 //! All real roots: where the line is divided first, and what is known of those that were found.
 
-use super::bracket::Brackets;
+use super::bracket::{Brackets, RealRoots};
 use super::sturm::Chain;
 
 /// Where trisection gives up on telling two roots apart: at a third of a third of an interval, and so on.
@@ -9,24 +9,6 @@ const MAX_DEPTH: u32 = 28;
 /// Where the line is first divided, by even angles on the circle that it closes to at infinity. None of these is a likely root,
 /// as zero is where a basis vector is itself a solution: there rounding decides the sign.
 const SPLITS: [[f64; 2]; 4] = [[-4.7, -1.53], [-0.66, -0.19], [0.21, 0.69], [1.48, 5.1]];
-
-/// The real roots that were found.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RealRoots<const N: usize> {
-    pub(super) values: [f64; N],
-    pub(super) len: usize,
-    /// Whether all of them were told apart and refined.
-    pub(crate) certain: bool,
-    /// Whether rounding may have moved roots on or off the line: two of them, real or not, are close, or the chain has lost its
-    /// digits on the way.
-    pub(crate) close: bool,
-}
-
-impl<const N: usize> RealRoots<N> {
-    pub(crate) fn as_slice(&self) -> &[f64] {
-        &self.values[..self.len]
-    }
-}
 
 /// All real roots of `p`, in increasing order.
 pub(crate) fn real_roots<const N: usize>(p: &[f64; N]) -> RealRoots<N> {

@@ -1,7 +1,7 @@
 //! Sturm's theorem: along the chain of a polynomial the sign changes at one point, less those at another, are the number of real
 //! roots between the two.
 
-use crate::algebra::two::Two;
+use crate::algebra::vectors::two::Two;
 
 /// A square of a gap, relative to the roots, at which rounding in the coefficients begins to decide what is real; one noisy
 /// five-point problem in a hundred has it.

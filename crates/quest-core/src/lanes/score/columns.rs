@@ -1,8 +1,16 @@
 //! Matches in structure of arrays, and their Sampson error.
 
-use super::kernel::Kernel;
-use crate::lanes::instructions::{Task, Token};
-use crate::lanes::lane::{F, Float, Lanes, WordLanes};
+use crate::algebra::vectors::instructions::{Task, Token};
+use crate::algebra::vectors::lane::{F, Float, Lanes, WordLanes};
+
+/// Work that can be done with any lanes of `T`.
+pub trait Kernel<T> {
+    /// What comes out.
+    type Output;
+
+    /// Does it.
+    fn run<L: Lanes<T>>(self, lanes: L) -> Self::Output;
+}
 
 /// How many matches are looked at between two questions whether to stop.
 pub(super) const BLOCK: usize = 64;

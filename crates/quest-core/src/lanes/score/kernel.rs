@@ -1,17 +1,8 @@
 //! The loops over all matches.
 
-use super::columns::{BLOCK, MatchColumns, Real};
+use super::columns::{BLOCK, Kernel, MatchColumns, Real};
 use super::{Loss, Score, Stop};
-use crate::lanes::lane::{F, Float, Lanes, MAX_LANES};
-
-/// Work that can be done with any lanes of `T`.
-pub trait Kernel<T> {
-    /// What comes out.
-    type Output;
-
-    /// Does it.
-    fn run<L: Lanes<T>>(self, lanes: L) -> Self::Output;
-}
+use crate::algebra::vectors::lane::{F, Float, Lanes, MAX_LANES};
 
 /// The score of one matrix.
 pub(super) struct Sum<'a, T, C> {

@@ -32,7 +32,7 @@ pub use columns::{BearingMatches, ImageMatches, MatchColumns, Real};
 use columns::BLOCK;
 use kernel::{Inliers, Sum};
 
-use super::instructions::{Instructions, Token};
+use crate::algebra::vectors::instructions::{Instructions, Token};
 
 /// What a match within the threshold counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

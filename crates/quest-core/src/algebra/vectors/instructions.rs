@@ -1,0 +1,139 @@
+//! Which vector instructions are used, and how a task is run with them.
+
+#[cfg(target_arch = "x86_64")]
+use pulp::{
+    Simd, WithSimd,
+    x86::{V1, V3, V4},
+};
+
+use crate::algebra::vectors::lane::{Lanes, WordLanes};
+use crate::algebra::vectors::portable::Portable;
+#[cfg(target_arch = "x86_64")]
+use crate::algebra::vectors::sse2::Sse2;
+#[cfg(target_arch = "x86_64")]
+use crate::algebra::vectors::vector::{Align32, Align64, Vector};
+
+/// Vector instructions, from the slowest to the fastest.
+///
+/// Results agree to rounding, not to the last bit: the faster ones round a product and a sum once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Instructions {
+    /// What every processor of the target has, as the compiler uses it.
+    Portable,
+    /// x86: SSE2, two lanes of `f64`. Every x86-64 has it.
+    Sse2,
+    /// x86: AVX2 with FMA, four lanes of `f64`.
+    Avx2,
+    /// x86: AVX-512, eight lanes of `f64`.
+    Avx512,
+}
+
+impl Instructions {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Portable, Self::Sse2, Self::Avx2, Self::Avx512];
+
+    /// The fastest that this processor has.
+    #[must_use]
+    pub fn best() -> Self {
+        Self::ALL.into_iter().rfind(|i| i.is_available()).unwrap_or(Self::Portable)
+    }
+
+    /// Whether this processor has them.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        Token::new(self).is_some()
+    }
+}
+
+impl Default for Instructions {
+    fn default() -> Self {
+        Self::best()
+    }
+}
+
+/// Work that can be done with any lanes. What it calls has to be inlined: a function of its own would be compiled
+/// for the instructions that every processor has.
+pub(crate) trait Task {
+    /// What comes out.
+    type Output;
+
+    /// Does it.
+    fn run<L: WordLanes + Lanes<f32>>(self, lanes: L) -> Self::Output;
+}
+
+/// Instructions that the processor is known to have.
+#[derive(Clone, Copy, Debug)]
+pub enum Token {
+    /// None in particular.
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Sse2(V1),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(V3),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(V4),
+}
+
+impl Token {
+    /// The proof that the processor has these instructions, if it does.
+    pub(crate) fn new(instructions: Instructions) -> Option<Self> {
+        match instructions {
+            Instructions::Portable => Some(Self::Portable),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Sse2 => V1::try_new().map(Self::Sse2),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => V3::try_new().map(Self::Avx2),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512 => V4::try_new().map(Self::Avx512),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => None,
+        }
+    }
+
+    /// That of the fastest instructions.
+    pub(crate) fn best() -> Self {
+        Self::new(Instructions::best()).unwrap_or(Self::Portable)
+    }
+
+    /// Runs a task.
+    #[inline]
+    pub(crate) fn run<K: Task>(self, task: K) -> K::Output {
+        match self {
+            Self::Portable => task.run(Portable),
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse2(simd) => task.run(Sse2(simd)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(simd) => Simd::vectorize(simd, Adapter::<_, Align32>(task, [])),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(simd) => Simd::vectorize(simd, Adapter::<_, Align64>(task, [])),
+        }
+    }
+
+    /// What it is the proof of.
+    pub(crate) fn instructions(self) -> Instructions {
+        match self {
+            Self::Portable => Instructions::Portable,
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse2(_) => Instructions::Sse2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => Instructions::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => Instructions::Avx512,
+        }
+    }
+}
+
+/// A task in the form that pulp runs.
+#[cfg(target_arch = "x86_64")]
+struct Adapter<K, A>(K, [A; 0]);
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Task, A: Copy> WithSimd for Adapter<K, A> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> K::Output {
+        self.0.run(Vector::<S, A>::new(simd))
+    }
+}

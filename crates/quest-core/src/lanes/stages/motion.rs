@@ -1,0 +1,163 @@
+//! From an essential matrix to a rotation and a direction of translation, and Newton's iteration on these five parameters.
+//!
+//! As the scalar solver does it: the residual of a match is `r = t · (b × c)`, `c = R a`, and for a small rotation `ω` after
+//! `R` and a move of the unit vector `t` by `δ1 e1 + δ2 e2` in its tangent plane
+//!
+//! ```text
+//! dr = ω · (c × (t × b)) + δ1 n · e1 + δ2 n · e2,   n = b × c
+//! ```
+
+use crate::algebra::vectors::lane::{F, Float, Lanes, M};
+use crate::lanes::stages::geometry::{
+    Matrix3, Quaternion, Vector3, composed, cross, dot, longest, normalized, product, quaternion, rotation,
+    scaled,
+};
+
+/// A relative pose without the length of its translation.
+#[derive(Clone, Copy)]
+pub(crate) struct Motion<L: Lanes<f64>> {
+    pub(crate) q_21: Quaternion<L>,
+    /// A unit vector of either sign.
+    pub(crate) t: Vector3<L>,
+}
+
+impl<L: Lanes<f64>> Motion<L> {
+    /// One of the two motions of an essential matrix of any scale, row by row: `R = cof E − [t]× E` where `|E|² = 2`, and the
+    /// columns of `cof E` are multiples of `t`.
+    #[inline(always)]
+    pub(crate) fn new(lanes: L, e: &[F<L>; 9]) -> Self {
+        let one = lanes.splat(1.0);
+        let columns = [[e[0], e[3], e[6]], [e[1], e[4], e[7]], [e[2], e[5], e[8]]];
+        let square = lanes.splat(2.0) / dot::<L, 9>(e, e);
+        let scale = square.sqrt();
+        let cofactors = [
+            cross::<L>(&columns[1], &columns[2]),
+            cross::<L>(&columns[2], &columns[0]),
+            cross::<L>(&columns[0], &columns[1]),
+        ];
+        let (t, length) = longest::<L>(&cofactors);
+        let t = scaled::<L, 3>(t, one / length.sqrt());
+        let scaled_t = scaled::<L, 3>(t, scale);
+        let mut r_21 = [[one; 3]; 3];
+        for j in 0..3 {
+            let turned = cross::<L>(&scaled_t, &columns[j]);
+            for i in 0..3 {
+                r_21[i][j] = square.mul_add(cofactors[j][i], -turned[i]);
+            }
+        }
+        Self { q_21: quaternion(lanes, &r_21), t }
+    }
+
+    /// `self` where the mask is set, `other` elsewhere.
+    #[inline(always)]
+    pub(crate) fn select(mut self, mask: M<L>, other: Self) -> Self {
+        for i in 0..4 {
+            self.q_21[i] = self.q_21[i].select(mask, other.q_21[i]);
+        }
+        for i in 0..3 {
+            self.t[i] = self.t[i].select(mask, other.t[i]);
+        }
+        self
+    }
+
+    /// One of Newton's steps to the solution of the constraints of five matches, given by their bearings in views 1 and 2, and
+    /// the square of its length (radians).
+    #[inline(always)]
+    pub(crate) fn step(&self, lanes: L, bearings: impl Fn(usize) -> [Vector3<L>; 2]) -> (Self, F<L>) {
+        let (one, half) = (lanes.splat(1.0), lanes.splat(0.5));
+        let t = &self.t;
+        let [e1, e2] = tangent_basis(lanes, t);
+        let r_21 = rotation(lanes, &self.q_21);
+        let mut equations = [[one; 6]; 5];
+        for i in 0..5 {
+            let [a, b] = bearings(i);
+            let c = product::<L>(&r_21, &a);
+            let n = cross::<L>(&b, &c);
+            let g = cross::<L>(&c, &cross::<L>(t, &b));
+            equations[i] =
+                [g[0], g[1], g[2], dot::<L, 3>(&n, &e1), dot::<L, 3>(&n, &e2), -dot::<L, 3>(&n, t)];
+        }
+        let step = solve(lanes, &mut equations);
+        let turn = [one, half * step[0], half * step[1], half * step[2]];
+        let mut moved = *t;
+        for i in 0..3 {
+            moved[i] = e2[i].mul_add(step[4], e1[i].mul_add(step[3], t[i]));
+        }
+        let q_21 = normalized::<L, 4>(lanes, composed::<L>(&turn, &self.q_21));
+        (Self { q_21, t: normalized::<L, 3>(lanes, moved) }, dot::<L, 5>(&step, &step))
+    }
+
+    /// The essential matrix `[t]× R`, row by row.
+    #[inline(always)]
+    pub(crate) fn essential(&self, lanes: L) -> [F<L>; 9] {
+        let r_21: Matrix3<L> = rotation(lanes, &self.q_21);
+        let mut e = [self.t[0]; 9];
+        for j in 0..3 {
+            let column = cross::<L>(&self.t, &[r_21[0][j], r_21[1][j], r_21[2][j]]);
+            for i in 0..3 {
+                e[3 * i + j] = column[i];
+            }
+        }
+        e
+    }
+}
+
+/// Two unit vectors that complete `t` to a right-handed frame (Duff et al., JCGT 2017).
+#[inline(always)]
+fn tangent_basis<L: Lanes<f64>>(lanes: L, t: &Vector3<L>) -> [Vector3<L>; 2] {
+    let one = lanes.splat(1.0);
+    let sign = (-one).select(t[2].less(lanes.splat(0.0)), one);
+    let a = -one / (sign + t[2]);
+    let b = t[0] * t[1] * a;
+    [
+        [(sign * t[0]).mul_add(t[0] * a, one), sign * b, -(sign * t[0])],
+        [b, t[1].mul_add(t[1] * a, sign), -t[1]],
+    ]
+}
+
+/// The solution of five linear equations, the right-hand sides last, by Householder reflections.
+#[inline(always)]
+fn solve<L: Lanes<f64>>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> [F<L>; 5] {
+    let inverse = [
+        eliminate::<L, 0>(lanes, m),
+        eliminate::<L, 1>(lanes, m),
+        eliminate::<L, 2>(lanes, m),
+        eliminate::<L, 3>(lanes, m),
+        lanes.splat(1.0) / m[4][4],
+    ];
+    let mut x = [lanes.splat(0.0); 5];
+    for k in (0..5).rev() {
+        let mut sum = m[k][5];
+        for j in k + 1..5 {
+            sum = m[k][j].neg_mul_add(x[j], sum);
+        }
+        x[k] = sum * inverse[k];
+    }
+    x
+}
+
+/// Makes zero what stands below the diagonal in column `K`, for the columns behind it, and returns the inverse of what is then on
+/// the diagonal.
+#[inline(always)]
+fn eliminate<L: Lanes<f64>, const K: usize>(lanes: L, m: &mut [[F<L>; 6]; 5]) -> F<L> {
+    let one = lanes.splat(1.0);
+    let mut square = m[K][K] * m[K][K];
+    for i in K + 1..5 {
+        square = m[i][K].mul_add(m[i][K], square);
+    }
+    let length = square.sqrt();
+    let image = (-length).select(lanes.splat(0.0).less(m[K][K]), length);
+    m[K][K] = m[K][K] - image;
+    let inverse = -one / (image * m[K][K]);
+    for j in K + 1..6 {
+        let mut dot = m[K][K] * m[K][j];
+        for i in K + 1..5 {
+            dot = m[i][K].mul_add(m[i][j], dot);
+        }
+        let dot = dot * inverse;
+        for i in K..5 {
+            m[i][j] = dot.neg_mul_add(m[i][K], m[i][j]);
+        }
+    }
+    -inverse * m[K][K]
+}

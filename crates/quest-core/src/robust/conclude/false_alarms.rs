@@ -1,0 +1,84 @@
+//! Whether a pose agrees with more matches, or more closely, than chance would let it.
+//!
+//! How often a false match comes within a distance `r` of agreeing with a pose is measured on false matches: the points of view 1
+//! with those of view 2 shifted against them. That probability is `α(r) = r α(1)`, a band along a line. Of `n` matches the `k`
+//! nearest are within `r_k`; five of them any sample fits. So among `m` motions that were tried, the number of those that do as
+//! well by chance is at most
+//!
+//! ```text
+//! NFA = min over k of (n − 5) m C(n − 5, k − 5) α(r_k)^(k − 5)
+//! ```
+//!
+//! (after L. Moisan, B. Stival, *A probabilistic criterion to detect rigid point matches between two images*, IJCV 2004, who take
+//! all `C(n, 5)` samples for `m`).
+
+use crate::robust::data::columns::Columns;
+use crate::robust::data::observations::Observations;
+use crate::robust::search::pose_score::PoseScorer;
+use crate::solver::shared::motion::Motion;
+
+/// False matches that are looked at.
+const FALSE_MATCHES: usize = 1_000;
+
+/// False matches are counted up to this multiple of the threshold: there are more of them.
+const WIDE: f64 = 3.0;
+
+/// Real solutions of a sample, on average.
+const SOLUTIONS: f64 = 4.0;
+
+/// The base ten logarithm of the number of false alarms of a motion whose inliers `poses` holds, found among so many samples.
+pub(crate) fn log_false_alarms(
+    poses: &PoseScorer,
+    motion: &Motion,
+    iterations: usize,
+    false_matches: &Columns,
+) -> f64 {
+    let observations = poses.observations;
+    let chance = chance_of_a_pixel(false_matches, motion, poses.threshold());
+    let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals()[i as usize].abs()).collect();
+    errors.sort_unstable_by(f64::total_cmp);
+    least_log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64)
+}
+
+/// The same for the inliers' errors in ascending order.
+fn least_log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, tried: f64) -> f64 {
+    let free = matches - 5;
+    let all_samples: f64 = (0..5).map(|i| ((matches - i) as f64 / (5 - i) as f64).log10()).sum();
+    let fixed = (free as f64).log10() + tried.log10().min(all_samples + SOLUTIONS.log10());
+    let (mut choose, mut least) = (0.0, f64::INFINITY);
+    for (k, error) in (1..).zip(errors.iter().skip(5)) {
+        choose += ((free + 1 - k) as f64 / k as f64).log10();
+        let alarms = fixed + choose + k as f64 * (error * chance_of_a_pixel).min(1.0).log10();
+        least = alarms.min(least);
+    }
+    least
+}
+
+/// Matches that are false.
+pub(crate) fn false_matches(observations: &Observations) -> Columns {
+    observations.columns.shifted(FALSE_MATCHES)
+}
+
+/// The share of false matches that agree with a motion to one pixel.
+fn chance_of_a_pixel(false_matches: &Columns, motion: &Motion, threshold: f64) -> f64 {
+    let wide = WIDE * threshold;
+    let agreeing = 1.0 + false_matches.agreeing(motion, wide).len() as f64;
+    agreeing / (1.0 + false_matches.len() as f64) / wide
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn false_alarms_are_counted() {
+        // 5 · 252 · 4 · C(5, 5) · 0.01^5 = 5.04e-7.
+        let all = least_log_false_alarms(10, &[1.0; 10], 0.01, 1e9);
+        assert!((10_f64.powf(all) / 5.04e-7 - 1.0).abs() < 1e-9, "{all}");
+        // Ten of a hundred are no sign of anything, thirty are, and ten that agree closely.
+        assert!(least_log_false_alarms(100, &[1.0; 10], 0.01, 1e5) > 0.0);
+        assert!(least_log_false_alarms(100, &[1.0; 30], 0.01, 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1e-4; 10], 0.01, 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1.0; 5], 0.01, 1e5).is_infinite());
+    }
+}

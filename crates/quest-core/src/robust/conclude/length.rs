@@ -1,0 +1,179 @@
+//! The length of the translation in the scale of [`conventions`](crate::conventions): the mean absolute depth is one.
+//!
+//! Where every depth stands clear of its noise that is what is computed. Where some do not, inverse depths are the
+//! quantity whose noise is symmetric, and their median, signs included, goes to zero with the parallax. Weighted means would be
+//! ruled by a few chance inliers.
+//!
+//! The noise of depths, given the motion, averages out soon. What is left of the variance is which points the mean is over: true
+//! matches beyond the threshold are not among the inliers, and false ones are, with any depth.
+
+use nalgebra::{Vector3, Vector5};
+
+use crate::robust::conclude::inverse_depth::{Differentiated, InverseDepth};
+use crate::robust::data::columns::Columns;
+use crate::robust::data::observations::Observations;
+use crate::solver::shared::motion::Motion;
+
+/// A depth is clear of its noise at so many standard deviations.
+const CLEAR: f64 = 3.0;
+
+/// The share of depths that have to be.
+const MOST: f64 = 0.9;
+
+/// More matches than this are not looked at.
+const ENOUGH: usize = 2_000;
+
+/// The variance of a median over that of the mean, of normal variables.
+const MEDIAN_VARIANCE: f64 = std::f64::consts::FRAC_PI_2;
+
+/// A length, its variance for a given motion, and its derivatives by that.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Length {
+    pub(crate) value: f64,
+    pub(crate) variance: f64,
+    by_rotation: Vector3<f64>,
+    by_direction: Vector3<f64>,
+}
+
+impl Length {
+    /// The derivatives by the parameters of [`Motion::stepped`].
+    pub(crate) fn slope(&self, tangent: &[Vector3<f64>; 2]) -> Vector5<f64> {
+        let [t0, t1] = tangent.map(|tangent| self.by_direction.dot(&tangent));
+        Vector5::new(self.by_rotation.x, self.by_rotation.y, self.by_rotation.z, t0, t1)
+    }
+}
+
+/// The inverse depths of a match in view 1 and in view 2, and their variance.
+#[derive(Clone, Copy, Debug)]
+struct BothDepths {
+    rho: [Differentiated; 2],
+    variance: f64,
+}
+
+impl BothDepths {
+    /// Of a match whose vectors have these lengths where they were given: depths are multiples of them.
+    fn new(columns: &Columns, index: usize, lengths: Option<[f64; 2]>, motion: &Motion, sigma: f64) -> Self {
+        let depth = InverseDepth::new(columns, motion, index);
+        let scales =
+            lengths.map_or([1.0; 2], |[first, second]| [first / depth.x1.norm(), second / depth.x2.norm()]);
+        let [one, two] = depth.differentiated(motion);
+        Self { rho: [one * scales[0], two * scales[1]], variance: depth.variance(sigma) }
+    }
+
+    /// Its variance over its square.
+    fn relative(&self) -> f64 {
+        let sum = self.rho[0].value + self.rho[1].value;
+        4.0 * self.variance / (sum * sum)
+    }
+
+    /// The mean of the two depths.
+    fn z(&self) -> f64 {
+        0.5 * (1.0 / self.rho[0].value + 1.0 / self.rho[1].value)
+    }
+
+    fn is_clear(&self) -> bool {
+        self.rho.iter().all(|rho| rho.value > 0.0) && self.relative() < 1.0 / (CLEAR * CLEAR)
+    }
+}
+
+/// What is known of the noise of the inliers and of the matches that are among them by chance.
+pub(crate) struct Noise<'a> {
+    /// In pixels.
+    pub(crate) sigma: f64,
+    pub(crate) false_matches: &'a Columns,
+}
+
+/// The length of the translation of a motion, negative where most of the points are behind the cameras.
+pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u32], noise: &Noise) -> Length {
+    let some = &inliers[..inliers.len().min(ENOUGH)];
+    if some.is_empty() {
+        let zero = Vector3::zeros();
+        return Length { value: 0.0, variance: 0.0, by_rotation: zero, by_direction: zero };
+    }
+    let of_inlier = |&index: &u32| {
+        let m = &observations.matches[index as usize];
+        let lengths = Some([m.length1(), m.length2()]);
+        BothDepths::new(&observations.columns, index as usize, lengths, motion, noise.sigma)
+    };
+    let all: Vec<_> = some.iter().map(of_inlier).collect();
+    let clear: Vec<_> = all.iter().copied().filter(BothDepths::is_clear).collect();
+    if (clear.len() as f64) < MOST * all.len() as f64 {
+        return by_inverse_depths(&all);
+    }
+    let Noise { sigma, false_matches } = *noise;
+    let threshold = false_matches.threshold();
+    let of_false = |index: u32| BothDepths::new(false_matches, index as usize, None, motion, sigma);
+    let agreeing = false_matches.agreeing(motion, threshold).into_iter().map(of_false);
+    let outliers = (observations.len() - inliers.len()) as f64 * some.len() as f64 / inliers.len() as f64;
+    let chance = Chance {
+        depths: agreeing.filter(BothDepths::is_clear).map(|depth| depth.z()).collect(),
+        each: outliers / false_matches.len().max(1) as f64,
+        missed: beyond(threshold / sigma),
+    };
+    by_depths(&clear, &chance)
+}
+
+/// What share of a normal variable is beyond so many standard deviations, by the bound of Mills' ratio.
+fn beyond(deviations: f64) -> f64 {
+    let bound = std::f64::consts::FRAC_2_PI.sqrt() * (-0.5 * deviations * deviations).exp() / deviations;
+    bound.min(1.0)
+}
+
+/// The inliers that are false, and the true matches that are not among them.
+struct Chance {
+    /// The depths of some that are false.
+    depths: Vec<f64>,
+    /// As how many inliers each of them counts.
+    each: f64,
+    /// The share of true matches that are no inliers.
+    missed: f64,
+}
+
+/// The inverse of the mean of depths that are clear of noise.
+fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
+    let (mut sum, mut by_rotation, mut by_direction) = (0.0, Vector3::zeros(), Vector3::zeros());
+    for depth in all {
+        // The mean of 1/ρ over the noise is (1 + relative variance)/ρ to second order.
+        sum += depth.z() * (1.0 - depth.relative());
+        for rho in &depth.rho {
+            let weight = 0.5 / (rho.value * rho.value);
+            by_rotation += rho.by_rotation * weight;
+            by_direction += rho.by_direction * weight;
+        }
+    }
+    let count = all.len() as f64;
+    let value = count / sum;
+    let square = |z: &f64| (z * value - 1.0).powi(2);
+    let of_noise: f64 =
+        all.iter().map(|depth| depth.variance * depth.z().powi(4)).sum::<f64>() * value * value;
+    let of_missed = chance.missed * all.iter().map(|depth| square(&depth.z())).sum::<f64>();
+    let of_false = chance.each * chance.depths.iter().map(square).sum::<f64>();
+    // d(n/Σz) = (n/Σz)² Σ z² dρ / n.
+    let by_mean = value * value / count;
+    Length {
+        value,
+        variance: (of_noise + of_missed + of_false) * (value / count).powi(2),
+        by_rotation: by_rotation * by_mean,
+        by_direction: by_direction * by_mean,
+    }
+}
+
+/// The median of the inverse depths, with the slope of their mean.
+fn by_inverse_depths(all: &[BothDepths]) -> Length {
+    let count = all.len() as f64;
+    let [mut first, mut second] =
+        [0, 1].map(|k| all.iter().map(|depth| depth.rho[k].value).collect::<Vec<_>>());
+    let variance: f64 = all.iter().map(|depth| depth.variance).sum();
+    let all = || all.iter().flat_map(|depth| &depth.rho);
+    Length {
+        value: 0.5 * (median(&mut first) + median(&mut second)),
+        variance: MEDIAN_VARIANCE * variance / (count * count),
+        by_rotation: all().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() / (2.0 * count),
+        by_direction: all().map(|rho| rho.by_direction).sum::<Vector3<f64>>() / (2.0 * count),
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

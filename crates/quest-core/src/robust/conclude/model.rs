@@ -1,0 +1,134 @@
+//! Which model the matches support: a rotation alone, a plane, or points in space.
+//!
+//! Every model explains less than the next and more than nothing; the question is whether what it leaves is more than
+//! noise. Over the inliers of the essential matrix
+//!
+//! ```text
+//! F_M = (1/n) Σ [min(d_M²/σ², 9.21) − min(r_E²/σ², 9.21)]
+//! ```
+//!
+//! with `d_M` the whitened transfer error of the model (two numbers a match) and `r_E` the Sampson error (one number). Where
+//! the model holds, `F` is one: the second number is noise as the first (the idea of K. Kanatani's geometric information
+//! criterion, with a cap against false matches). Where it does not, `F` goes to the cap.
+
+use nalgebra::UnitQuaternion;
+
+use crate::alignment::best_rotation;
+use crate::robust::conclude::plane::Plane;
+use crate::robust::data::observations::Observations;
+use crate::robust::data::point_transfer::Framed;
+use crate::robust::estimate::{Evidence, Model};
+use crate::robust::refine::loss::SCALE;
+use crate::robust::refine::loss::{CAP, GemanMcClure};
+use crate::robust::refine::point_transfer::refine_rotation;
+use crate::robust::search::pose_score::PoseScorer;
+
+/// A rotation alone is enough below this.
+const ROTATION: f64 = 3.0;
+
+/// A plane is enough below this, and a little above it where there are few matches.
+const PLANE: f64 = 1.7;
+const PLANE_OF_FEW: f64 = 20.0;
+
+/// A plane is exact below this, at the noise that the matches show: one, and its scatter for a hundred matches.
+const EXACT_PLANE: f64 = 1.3;
+
+/// The noise that models are compared at is not taken to be below this share of the threshold: of noise so small
+/// every real camera's calibration error stands clear.
+const LEAST_NOISE: f64 = 0.3;
+
+/// More matches than this are not looked at.
+const ENOUGH: usize = 300;
+
+/// A rotation whose mean capped error over some of the matches is above this is not refined over all of them: it is not enough.
+const HOPELESS: f64 = 7.0;
+
+/// Matches over which the two starts of the rotation are compared.
+const FITTED: usize = 60;
+
+/// Steps of the rotation's refinement.
+const STEPS: usize = 8;
+
+/// Which model, and why.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verdict {
+    pub(crate) model: Model,
+    pub(crate) evidence: Evidence,
+    /// The best rotation without translation.
+    pub(crate) q_21: UnitQuaternion<f64>,
+    /// Whether the plane leaves nothing but noise: its own motions are then better than those of the essential matrix.
+    pub(crate) is_exact_plane: bool,
+}
+
+/// Compares the models over the inliers that `poses` holds, those of a pose with rotation `q_21` and noise `sigma` (pixels).
+pub(crate) fn choose(
+    poses: &PoseScorer,
+    q_21: &UnitQuaternion<f64>,
+    plane: Option<&Plane>,
+    sigma: f64,
+) -> Verdict {
+    let observations = poses.observations;
+    let inliers = &poses.inliers[..poses.inliers.len().min(ENOUGH)];
+    let noise = sigma;
+    let sigma = noise.max(LEAST_NOISE * poses.threshold());
+    let framed = observations.framed(inliers);
+    let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals()[i as usize].powi(2)).collect();
+    let rotation = framed.square_errors(&r_21);
+    let planar = plane.map(|plane| framed.square_errors(&plane.homography));
+    let excess = |model: &[f64], sigma: f64| {
+        let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
+        (capped(model) - capped(&general)) / inliers.len().max(1) as f64
+    };
+    let few = (PLANE_OF_FEW / inliers.len().max(1) as f64).min(1.0);
+    let of_plane = |sigma| planar.as_ref().map_or(CAP, |planar| excess(planar, sigma));
+    let is_exact_plane = of_plane(noise) < EXACT_PLANE;
+    let model = if excess(&rotation, sigma) < ROTATION {
+        Model::PureRotation
+    } else if of_plane(sigma) < PLANE + few {
+        Model::Planar
+    } else {
+        Model::General
+    };
+    let evidence = Evidence {
+        rotation_px: median_root(rotation),
+        planar_px: planar.map_or(f64::INFINITY, median_root),
+        general_px: median_root(general),
+    };
+    Verdict { model, evidence, q_21, is_exact_plane }
+}
+
+/// The rotation that best takes the points to their matches, from two starts: that of the pose and that which aligns the
+/// bearings.
+fn rotation_alone(
+    observations: &Observations,
+    inliers: &[u32],
+    framed: &Framed,
+    q_21: &UnitQuaternion<f64>,
+    sigma: f64,
+) -> UnitQuaternion<f64> {
+    let some = &observations.framed(&inliers[..inliers.len().min(FITTED)]);
+    let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
+    let wide = GemanMcClure::new(2.0 * SCALE * sigma);
+    let starts = [*q_21, best_rotation(&matches)].map(|mut q| {
+        let cost = refine_rotation(some, &mut q, &wide, STEPS);
+        (q, cost)
+    });
+    let mut q = if starts[1].1 < starts[0].1 { starts[1].0 } else { starts[0].0 };
+    let r_21 = q.to_rotation_matrix().into_inner();
+    let squares = some.square_errors(&r_21).into_iter().map(|s| (s / (sigma * sigma)).min(CAP));
+    if squares.sum::<f64>() < HOPELESS * some.len() as f64 {
+        refine_rotation(framed, &mut q, &GemanMcClure::new(SCALE * sigma), STEPS);
+    }
+    q
+}
+
+/// The root of the median, infinite of nothing.
+fn median_root(mut squares: Vec<f64>) -> f64 {
+    let middle = squares.len() / 2;
+    if squares.is_empty() {
+        return f64::INFINITY;
+    }
+    squares.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
+}

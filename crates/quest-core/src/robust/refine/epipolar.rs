@@ -1,0 +1,272 @@
+//! Refinement of a motion on its manifold: Levenberg–Marquardt on the Sampson errors, with analytic derivatives.
+//!
+//! With `r = e / √g`, `e = x2ᵀ F x1` and `g` its squared gradient (see [`observations`](crate::robust::data::observations)), the derivative
+//! of `r` by the entries of `F` is one 3 × 3 matrix a match, and that of `F` by each of the five parameters of
+//! [`Motion`] one 3 × 3 matrix for all: a row of the Jacobian is five products of the two.
+
+use nalgebra::{Matrix3, Matrix5, Vector5};
+
+use crate::algebra::vectors::widest::{Work, widest};
+use crate::epipolar_frame::tangent_basis;
+use crate::robust::data::columns::Columns;
+use crate::robust::refine::loss::{LEAST_SQUARES, Loss};
+use crate::solver::shared::motion::{Motion, damped_step};
+
+/// Matches that are worked on at once.
+const WIDTH: usize = 8;
+
+/// A descent is at its end when the next step gains no more than this, in units of the mean cost of a match, which is about
+/// half the variance of what noise leaves undetermined. That step is made, and needs no check.
+pub(crate) const FINE: f64 = 1e-4;
+/// Near enough to a minimum to begin another descent there.
+pub(crate) const COARSE: f64 = 1e-2;
+
+/// A step shorter than this (radians) moves nothing that can be measured.
+const SHORT: f64 = 1e-8;
+
+/// Some of the matches, in columns of their own.
+#[derive(Clone, Debug)]
+pub(crate) struct Subset {
+    blocks: Vec<Block>,
+    len: usize,
+    inverse_scales: [[f64; 3]; 2],
+    curvature: f64,
+    is_sphere: bool,
+}
+
+/// A few matches, the last of all repeated where there are fewer.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    columns: [[f64; WIDTH]; 6],
+    /// One for a match, zero for a repeated one.
+    live: [f64; WIDTH],
+}
+
+/// The normal equations of a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Equations {
+    pub(crate) cost: f64,
+    pub(crate) hessian: Matrix5<f64>,
+    pub(crate) gradient: Vector5<f64>,
+}
+
+/// What one match says of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct One {
+    /// `r²`.
+    pub(crate) square: f64,
+    /// `J r`.
+    pub(crate) gradient: Vector5<f64>,
+    /// `ψ/r` under the loss.
+    pub(crate) weight: f64,
+    /// `ψ/r Jᵀ H⁻¹ J`.
+    pub(crate) leverage: f64,
+}
+
+impl One {
+    /// `inverse` is `H⁻¹` of the matches that the motion was fitted to.
+    pub(crate) fn new(
+        all: &Columns,
+        index: u32,
+        motion: &Motion,
+        loss: &impl Loss,
+        inverse: &Matrix5<f64>,
+    ) -> Self {
+        let Equations { cost: square, hessian, gradient } =
+            Subset::new(all, &[index]).equations(motion, &LEAST_SQUARES);
+        let weight = loss.cost_and_weight(square).1;
+        Self { square, gradient, weight, leverage: weight * (inverse * hessian).trace() }
+    }
+}
+
+impl Subset {
+    pub(crate) fn new(all: &Columns, indices: &[u32]) -> Self {
+        let columns = all.all();
+        let block = |some: &[u32]| {
+            let index = |j: usize| some[j.min(some.len() - 1)] as usize;
+            Block {
+                columns: std::array::from_fn(|k| std::array::from_fn(|j| columns[k][index(j)])),
+                live: std::array::from_fn(|j| if j < some.len() { 1.0 } else { 0.0 }),
+            }
+        };
+        Self {
+            blocks: indices.chunks(WIDTH).map(block).collect(),
+            len: indices.len(),
+            inverse_scales: all.inverse_scales(),
+            curvature: all.curvature(),
+            is_sphere: all.is_sphere(),
+        }
+    }
+
+    /// The cost of a motion and the normal equations of a step from it.
+    pub(crate) fn equations(&self, motion: &Motion, loss: &impl Loss) -> Equations {
+        let derivatives = motion.essential_derivatives(&tangent_basis(&motion.direction));
+        let [d1, d2] = &self.inverse_scales;
+        let f = fundamental(&motion.essential(), d1, d2);
+        let df = derivatives.map(|de| fundamental(&de, d1, d2));
+        widest(Accumulation { subset: self, f, df, loss: *loss })
+    }
+
+    #[inline(always)]
+    fn accumulate<const SPHERE: bool>(
+        &self,
+        f: &[f64; 9],
+        df: &[[f64; 9]; 5],
+        loss: &impl Loss,
+    ) -> Equations {
+        let mut cost = [0.0; WIDTH];
+        let mut upper = [[0.0; WIDTH]; 15];
+        let mut gradient = [[0.0; WIDTH]; 5];
+        for Block { columns, live } in &self.blocks {
+            let (residual, slope) = linearised::<SPHERE>(f, columns, self.curvature);
+            let mut weight = [0.0; WIDTH];
+            for j in 0..WIDTH {
+                let (c, w) = loss.cost_and_weight(residual[j] * residual[j]);
+                cost[j] += live[j] * c;
+                weight[j] = live[j] * w;
+            }
+            let mut jacobian = [[0.0; WIDTH]; 5];
+            for (row, df) in jacobian.iter_mut().zip(df) {
+                for k in 0..9 {
+                    for j in 0..WIDTH {
+                        row[j] += df[k] * slope[k][j];
+                    }
+                }
+            }
+            let mut entry = 0;
+            for a in 0..5 {
+                let mut weighted = [0.0; WIDTH];
+                for j in 0..WIDTH {
+                    weighted[j] = weight[j] * jacobian[a][j];
+                    gradient[a][j] += weighted[j] * residual[j];
+                }
+                for b in a..5 {
+                    for j in 0..WIDTH {
+                        upper[entry][j] += weighted[j] * jacobian[b][j];
+                    }
+                    entry += 1;
+                }
+            }
+        }
+        let mut hessian = Matrix5::zeros();
+        let mut entry = 0;
+        for a in 0..5 {
+            for b in a..5 {
+                let sum = upper[entry].iter().sum();
+                hessian[(a, b)] = sum;
+                hessian[(b, a)] = sum;
+                entry += 1;
+            }
+        }
+        Equations {
+            cost: cost.iter().sum(),
+            hessian,
+            gradient: Vector5::from_fn(|a, _| gradient[a].iter().sum()),
+        }
+    }
+}
+
+/// The sums of the normal equations.
+struct Accumulation<'a, L> {
+    subset: &'a Subset,
+    f: [f64; 9],
+    df: [[f64; 9]; 5],
+    loss: L,
+}
+
+impl<L: Loss> Work for Accumulation<'_, L> {
+    type Output = Equations;
+
+    #[inline(always)]
+    fn run(self) -> Equations {
+        let Self { subset, f, df, loss } = self;
+        if subset.is_sphere {
+            subset.accumulate::<true>(&f, &df, &loss)
+        } else {
+            subset.accumulate::<false>(&f, &df, &loss)
+        }
+    }
+}
+
+/// The residuals of a few matches, and their derivatives by the entries of `F`, row by row.
+#[inline(always)]
+fn linearised<const SPHERE: bool>(
+    f: &[f64; 9],
+    [x1, y1, z1, x2, y2, z2]: &[[f64; WIDTH]; 6],
+    curvature: f64,
+) -> ([f64; WIDTH], [[f64; WIDTH]; 9]) {
+    let mut residual = [0.0; WIDTH];
+    let mut slope = [[0.0; WIDTH]; 9];
+    for j in 0..WIDTH {
+        let (z1, z2) = if SPHERE { (z1[j], z2[j]) } else { (1.0, 1.0) };
+        let (x1, y1, x2, y2) = (x1[j], y1[j], x2[j], y2[j]);
+        let l0 = f[0] * x1 + f[1] * y1 + f[2] * z1;
+        let l1 = f[3] * x1 + f[4] * y1 + f[5] * z1;
+        let l2 = f[6] * x1 + f[7] * y1 + f[8] * z1;
+        let m0 = f[0] * x2 + f[3] * y2 + f[6] * z2;
+        let m1 = f[1] * x2 + f[4] * y2 + f[7] * z2;
+        let m2 = if SPHERE { f[2] * x2 + f[5] * y2 + f[8] * z2 } else { 0.0 };
+        let e = x2 * l0 + y2 * l1 + z2 * l2;
+        let mut square = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1;
+        if SPHERE {
+            square += l2 * l2 + m2 * m2 - e * e * curvature;
+        }
+        let inverse = 1.0 / square.max(f64::MIN_POSITIVE).sqrt();
+        let r = e * inverse;
+        // dr = de/√g − r/(2g) dg, where dg = 2 (l · dl + m · dm − κ e de).
+        let q = r * inverse * inverse;
+        let along = if SPHERE { inverse + q * e * curvature } else { inverse };
+        let (p0, p1, p2) = (q * l0, q * l1, if SPHERE { q * l2 } else { 0.0 });
+        let (s0, s1, s2) = (q * m0, q * m1, if SPHERE { q * m2 } else { 0.0 });
+        residual[j] = r;
+        slope[0][j] = along * x2 * x1 - p0 * x1 - s0 * x2;
+        slope[1][j] = along * x2 * y1 - p0 * y1 - s1 * x2;
+        slope[2][j] = along * x2 * z1 - p0 * z1 - s2 * x2;
+        slope[3][j] = along * y2 * x1 - p1 * x1 - s0 * y2;
+        slope[4][j] = along * y2 * y1 - p1 * y1 - s1 * y2;
+        slope[5][j] = along * y2 * z1 - p1 * z1 - s2 * y2;
+        slope[6][j] = along * z2 * x1 - p2 * x1 - s0 * z2;
+        slope[7][j] = along * z2 * y1 - p2 * y1 - s1 * z2;
+        slope[8][j] = along * z2 * z1 - p2 * z1 - s2 * z2;
+    }
+    (residual, slope)
+}
+
+/// `D2 E D1`, row by row.
+#[inline]
+pub(crate) fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f64; 9] {
+    std::array::from_fn(|k| d2[k / 3] * e[(k / 3, k % 3)] * d1[k % 3])
+}
+
+/// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, with at most so many steps.
+pub(crate) fn refine(subset: &Subset, motion: &mut Motion, loss: &impl Loss, until: f64, max_steps: usize) {
+    let mut damping = 1e-4;
+    let mut current = subset.equations(motion, loss);
+    for _ in 0..max_steps {
+        let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else {
+            damping *= 10.0;
+            if damping > 1e4 {
+                break;
+            }
+            continue;
+        };
+        let trial = motion.stepped(&tangent_basis(&motion.direction), &step.into());
+        let expected = -current.gradient.dot(&step);
+        let is_last =
+            expected * subset.len as f64 <= until * current.cost || step.norm_squared() < SHORT * SHORT;
+        if is_last {
+            *motion = trial;
+            break;
+        }
+        let next = subset.equations(&trial, loss);
+        if next.cost < current.cost {
+            (*motion, current) = (trial, next);
+            damping = (0.1 * damping).max(1e-10);
+        } else {
+            damping *= 10.0;
+            if damping > 1e4 {
+                break;
+            }
+        }
+    }
+}

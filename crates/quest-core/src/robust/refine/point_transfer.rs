@@ -1,0 +1,195 @@
+//! Refinement of models that take a point to a point, not to a line: a homography, and the rotation alone. Their residuals are
+//! those of [`data::point_transfer`](crate::robust::data::point_transfer).
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
+
+use crate::algebra::vectors::widest::{Work, widest};
+use crate::robust::data::point_transfer::{Framed, Lanes, WIDTH, rows, whitened};
+use crate::robust::refine::loss::{LEAST_SQUARES, Loss};
+
+/// A descent is at its end when the next step gains no more than this in units of the mean cost of a match.
+const FINE: f64 = 1e-3;
+
+/// The normal equations in `P` parameters.
+struct Equations<const P: usize> {
+    cost: f64,
+    hessian: SMatrix<f64, P, P>,
+    gradient: SVector<f64, P>,
+}
+
+/// What the parameters of a model are.
+trait Parameters<const P: usize>: Copy {
+    /// The derivatives by the parameters, from those by `y`, from `x1` and from `y`.
+    fn row(self, slope: &[f64; 3], x1: &[f64; 3], y: &[f64; 3]) -> [f64; P];
+}
+
+/// The nine entries of a homography.
+#[derive(Clone, Copy)]
+struct Entries;
+
+impl Parameters<9> for Entries {
+    #[inline(always)]
+    fn row(self, slope: &[f64; 3], x1: &[f64; 3], _: &[f64; 3]) -> [f64; 9] {
+        std::array::from_fn(|k| slope[k / 3] * x1[k % 3])
+    }
+}
+
+/// A small rotation after another.
+#[derive(Clone, Copy)]
+struct Turn;
+
+impl Parameters<3> for Turn {
+    /// `y × slope`.
+    #[inline(always)]
+    fn row(self, slope: &[f64; 3], _: &[f64; 3], y: &[f64; 3]) -> [f64; 3] {
+        [
+            y[1] * slope[2] - y[2] * slope[1],
+            y[2] * slope[0] - y[0] * slope[2],
+            y[0] * slope[1] - y[1] * slope[0],
+        ]
+    }
+}
+
+fn equations<const P: usize, R: Parameters<P>>(
+    matches: &Framed,
+    h: &Matrix3<f64>,
+    loss: &impl Loss,
+    parameters: R,
+) -> Equations<P> {
+    widest(Accumulation { matches, h: rows(h), loss: *loss, parameters })
+}
+
+/// The sums of the normal equations.
+struct Accumulation<'a, const P: usize, L, R: Parameters<P>> {
+    matches: &'a Framed,
+    h: [f64; 9],
+    loss: L,
+    parameters: R,
+}
+
+impl<const P: usize, L: Loss, R: Parameters<P>> Work for Accumulation<'_, P, L, R> {
+    type Output = Equations<P>;
+
+    #[inline(always)]
+    fn run(self) -> Equations<P> {
+        let Self { matches, h, loss, parameters } = self;
+        let behind = loss.cost_and_weight(f64::MAX.sqrt()).0;
+        let mut cost = [0.0; WIDTH];
+        let mut upper = [[[0.0; WIDTH]; P]; P];
+        let mut gradient = [[0.0; WIDTH]; P];
+        for block in &matches.blocks {
+            let w = whitened(&h, block);
+            let mut weight = [0.0; WIDTH];
+            for j in 0..WIDTH {
+                let [r, s] = [w.residual[0][j], w.residual[1][j]];
+                let (c, live) = loss.cost_and_weight(r * r + s * s);
+                let c = if w.is_in_front[j] { c } else { behind };
+                cost[j] += if block.is_live[j] { c } else { 0.0 };
+                weight[j] = if block.is_live[j] & w.is_in_front[j] { live } else { 0.0 };
+            }
+            for k in 0..2 {
+                let mut jacobian = [[0.0; WIDTH]; P];
+                for j in 0..WIDTH {
+                    let of = |v: &[Lanes; 3]| [v[0][j], v[1][j], v[2][j]];
+                    let row = parameters.row(&of(&w.slope[k]), &of(&block.x1), &of(&w.y));
+                    for a in 0..P {
+                        jacobian[a][j] = row[a];
+                    }
+                }
+                for a in 0..P {
+                    let mut weighted = [0.0; WIDTH];
+                    for j in 0..WIDTH {
+                        weighted[j] = weight[j] * jacobian[a][j];
+                        gradient[a][j] += weighted[j] * w.residual[k][j];
+                    }
+                    for b in a..P {
+                        for j in 0..WIDTH {
+                            upper[a][b][j] += weighted[j] * jacobian[b][j];
+                        }
+                    }
+                }
+            }
+        }
+        Equations {
+            cost: cost.iter().sum(),
+            hessian: SMatrix::from_fn(|a, b| upper[a.min(b)][a.max(b)].iter().sum()),
+            gradient: SVector::from_fn(|a, _| gradient[a].iter().sum()),
+        }
+    }
+}
+
+/// Levenberg–Marquardt; `at` gives the equations of a model, `moved` makes a step. The cost before the last step.
+fn minimise<const P: usize, M: Clone>(
+    model: &mut M,
+    count: usize,
+    max_steps: usize,
+    at: impl Fn(&M) -> Equations<P>,
+    moved: impl Fn(&M, &SVector<f64, P>) -> M,
+) -> f64 {
+    let (mut damping, mut current) = (1e-3, at(model));
+    for _ in 0..max_steps {
+        let mut damped = current.hessian;
+        // The scale of a homography is free: a little of the trace holds it.
+        let free = 1e-12 * current.hessian.trace();
+        for k in 0..P {
+            damped[(k, k)] += damping * damped[(k, k)] + free;
+        }
+        let Some(factor) = nalgebra::Cholesky::new(damped) else { break };
+        let step = -factor.solve(&current.gradient);
+        let trial = moved(model, &step);
+        if -current.gradient.dot(&step) * count as f64 <= FINE * current.cost {
+            *model = trial;
+            break;
+        }
+        let next = at(&trial);
+        if next.cost < current.cost {
+            (*model, current) = (trial, next);
+            damping = (0.1_f64 * damping).max(1e-9);
+        } else {
+            damping *= 10.0;
+            if damping.is_nan() || damping > 1e5 {
+                break;
+            }
+        }
+    }
+    current.cost
+}
+
+/// Refines a homography of any scale over some of the matches.
+pub(crate) fn refine_homography(
+    matches: &Framed,
+    h: &mut Matrix3<f64>,
+    loss: &impl Loss,
+    max_steps: usize,
+) -> f64 {
+    *h /= h.norm();
+    minimise(
+        h,
+        matches.len(),
+        max_steps,
+        |h| equations(matches, h, loss, Entries),
+        |h, step| (h + Matrix3::from_fn(|i, j| step[3 * i + j])).normalize(),
+    )
+}
+
+/// Refines a rotation over some of the matches.
+pub(crate) fn refine_rotation(
+    matches: &Framed,
+    q_21: &mut UnitQuaternion<f64>,
+    loss: &impl Loss,
+    max_steps: usize,
+) -> f64 {
+    minimise(
+        q_21,
+        matches.len(),
+        max_steps,
+        |q| equations(matches, &q.to_rotation_matrix().into_inner(), loss, Turn),
+        |q, step| UnitQuaternion::new_normalize((UnitQuaternion::new(*step) * q).into_inner()),
+    )
+}
+
+/// `Σ Jᵀ J` of a rotation, without weights.
+pub(crate) fn rotation_hessian(matches: &Framed, q_21: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    equations(matches, &r_21, &LEAST_SQUARES, Turn).hessian
+}

@@ -1,0 +1,5 @@
+//! Control laws: from a pose to a velocity.
+
+pub mod differential_drive;
+pub mod free_camera;
+pub(crate) mod law;
