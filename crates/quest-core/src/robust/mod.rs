@@ -46,7 +46,7 @@ mod third_view;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-pub use batch::{Problem, estimate_batch};
+pub use batch::{Batch, Problem, estimate_batch};
 pub use estimate::{Estimate, Evidence, Model, RunnerUp};
 pub use options::{EstimateError, KnownDirection, Options, Priors};
 pub use third_view::{ThirdView, estimate_with_third_view};
@@ -85,7 +85,20 @@ pub fn estimate_with(
     options: &Options,
     priors: &Priors,
 ) -> Result<Estimate, EstimateError> {
-    answer(matches, options, priors, Answer::Best)
+    answer(matches, options, priors, Answer::Best, &|| false)
+}
+
+/// As [`estimate_with`], with a question that is asked every few samples: once `is_cancelled` says yes, the search ends.
+///
+/// # Errors
+/// Those of [`estimate_with`], and [`EstimateError::Cancelled`].
+pub fn estimate_until(
+    matches: &[Correspondence],
+    options: &Options,
+    priors: &Priors,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<Estimate, EstimateError> {
+    answer(matches, options, priors, Answer::Best, is_cancelled)
 }
 
 fn answer(
@@ -93,6 +106,7 @@ fn answer(
     options: &Options,
     priors: &Priors,
     answer: Answer,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<Estimate, EstimateError> {
     options.check()?;
     priors.check(matches.len())?;
@@ -104,7 +118,10 @@ fn answer(
     let mut order: Vec<usize> = (0..matches.len()).collect();
     order.shuffle(&mut rng);
     let observations = Observations::new(matches, order, options.focal_lengths, options.threshold);
-    let mut search = search(&observations, options, priors, rng.clone());
+    let mut search = search(&observations, options, priors, rng.clone(), is_cancelled);
+    if is_cancelled() {
+        return Err(EstimateError::Cancelled);
+    }
     let Some(best) = search.best else {
         return Err(no_pose(&observations, 0));
     };
@@ -136,6 +153,7 @@ fn search<'a>(
     options: &Options,
     priors: &Priors,
     rng: ChaCha8Rng,
+    is_cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Search<'a> {
     let mut search = Search::new(observations, options, priors.direction);
     if let Some(pose) = priors.pose
@@ -149,6 +167,7 @@ fn search<'a>(
         confidence: options.confidence,
         min_iterations: options.min_iterations,
         max_iterations: options.max_iterations,
+        is_cancelled,
     };
     search.run(&mut sampler, &limits);
     search

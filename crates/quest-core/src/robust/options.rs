@@ -156,6 +156,9 @@ pub enum EstimateError {
         /// All matches.
         matches: usize,
     },
+    /// The caller ended the search.
+    #[error("the search was ended before it had an answer")]
+    Cancelled,
 }
 
 impl Priors<'_> {

@@ -35,7 +35,7 @@ pub fn estimate_with_third_view(
     matches_31: &[Correspondence],
     options_31: &Options,
 ) -> Result<ThirdView, EstimateError> {
-    let one = |matches, options, which| answer(matches, options, &Priors::default(), which);
+    let one = |matches, options, which| answer(matches, options, &Priors::default(), which, &|| false);
     let mut first = one(matches_21, options_21, Answer::Best)?;
     let mut second = one(matches_31, options_31, Answer::Best)?;
     let (common_21, common_31) = common((matches_21, &first.inliers), (matches_31, &second.inliers));

@@ -50,11 +50,13 @@ const EQUAL: f64 = 1e-3;
 const EXACT: f64 = 1e-12;
 
 /// What stops the search.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
+#[derive(Clone, Copy)]
+pub(crate) struct Limits<'a> {
     pub(crate) confidence: f64,
     pub(crate) min_iterations: usize,
     pub(crate) max_iterations: usize,
+    /// Asked before each block of samples.
+    pub(crate) is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// The search for the best pose.
@@ -110,7 +112,7 @@ impl<'a> Search<'a> {
         let limits = &Limits { min_iterations, ..*limits };
         let mut enough = self.enough(limits);
         let mut block = FIRST_BLOCK;
-        while self.iterations < enough {
+        while self.iterations < enough && !(limits.is_cancelled)() {
             self.samples.clear();
             let mut sample = [0; MAX_SAMPLE];
             let wanted = (enough - self.iterations).next_multiple_of(LANES).min(block);
