@@ -1,5 +1,5 @@
 //! Real image pairs: five matches that agree with the reference always yield a candidate.
-#![expect(clippy::print_stdout, reason = "says what was found, and where nothing was tested")]
+#![expect(clippy::print_stdout, reason = "says what was found")]
 
 use quest_core::Correspondence;
 use quest_core::solver::{Kinds, SolverName};
@@ -13,12 +13,10 @@ const SEED_PAIRS: u64 = 300;
 const SAMPLES: usize = 20;
 
 #[test]
+#[ignore = "needs the recorded pairs in ../shared/data; scripts/test runs it where they are"]
 fn every_pair_has_a_candidate() {
     let pairs = load();
-    if pairs.is_empty() {
-        println!("skipped: there is no folder with image pairs beside the workspace");
-        return;
-    }
+    assert!(!pairs.is_empty(), "there is no folder ../shared/data/pairs beside the workspace");
     let mut rng = ChaCha8Rng::seed_from_u64(SEED_PAIRS);
     let mut best_errors = Vec::new();
     for pair in &pairs {
