@@ -118,14 +118,12 @@ fn answer(
     let mut order: Vec<usize> = (0..matches.len()).collect();
     order.shuffle(&mut rng);
     let observations = Observations::new(matches, order, options.focal_lengths, options.threshold);
-    let mut search = search(&observations, options, priors, rng.clone(), is_cancelled);
+    let (mut poses, found) = search(&observations, options, priors, rng.clone(), is_cancelled).into_result();
     if is_cancelled() {
         return Err(EstimateError::Cancelled);
     }
-    let Some(best) = search.best else {
-        return Err(no_pose(&observations, 0));
-    };
-    conclude::conclude(&mut search, best, answer, options.max_false_alarms, &mut rng)
+    let found = found.ok_or_else(|| no_pose(&observations, 0))?;
+    conclude::conclude(&mut poses, &found, answer, options.max_false_alarms, &mut rng)
 }
 
 /// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.

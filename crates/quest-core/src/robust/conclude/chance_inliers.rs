@@ -16,7 +16,7 @@
 
 use std::f64::consts::PI;
 
-use crate::robust::conclude::final_refinement::{FEWEST, Polished, sigma};
+use crate::robust::conclude::final_refinement::{FEWEST, Polished, best_of};
 use crate::robust::conclude::inverse_depth::{InverseDepth, Usual};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::epipolar::{FINE, One, Subset, refine};
@@ -36,31 +36,30 @@ const USUAL: f64 = 3.0;
 /// Among more inliers than this one false match has no weight.
 const ENOUGH: usize = 1_000;
 
-/// Refines a pose, whose inliers `poses` holds, without those that agree with it by chance; `poses` then holds the inliers of the
-/// result.
-pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: &mut Polished) {
+/// Refines a pose without the inliers that agree with it by chance.
+pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: Polished) -> Polished {
     let observations = poses.observations;
-    let mut motion = polished.scored.motion;
+    let mut motion = *polished.motion();
     // Of few matches none can be spared.
-    if !(MANY..=ENOUGH).contains(&poses.inliers.len()) {
-        return;
+    if !(MANY..=ENOUGH).contains(&polished.pose.inliers.len()) {
+        return polished;
     }
-    let mut chance = doubtful(observations, &poses.inliers, &motion, polished);
+    let mut chance = doubtful(observations, &polished.pose.inliers, &motion, &polished);
     if chance.is_empty() {
-        return;
+        return polished;
     }
-    poses.score(motion, polished.limit);
-    let mut kept = poses.inliers.clone();
+    let mut kept = poses.score(motion, polished.limit).inliers;
     for _ in 0..ROUNDS {
         if chance.is_empty() || kept.len() < FEWEST + chance.len() {
             break;
         }
         kept.retain(|i| !chance.contains(i));
         refine(&Subset::new(&observations.columns, &kept), &mut motion, &polished.loss, FINE, STEPS);
-        chance = doubtful(observations, &kept, &motion, polished);
+        chance = doubtful(observations, &kept, &motion, &polished);
     }
-    polished.scored = poses.best_pose(&motion.essential(), poses.threshold()).unwrap_or(polished.scored);
-    polished.sigma = sigma(poses, &polished.scored.motion);
+    let motion = best_of(poses, &motion).map_or(*polished.motion(), |best| best.motion);
+    let pose = poses.score(motion, poses.threshold());
+    polished.with_pose(pose, poses.threshold())
 }
 
 /// The inliers that are more likely false than true.
@@ -123,13 +122,11 @@ mod tests {
         let order = (0..scene.matches.len()).collect();
         let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
         let mut poses = PoseScorer::new(&observations, Loss::default());
-        let mut polished = polish(&mut poses, start);
-        let before = polished.scored.motion;
-        poses.score(before, 1.5);
-        refine_without_chance(&mut poses, &mut polished);
-        let after = polished.scored.motion;
-        poses.score(after, 1.5);
-        let more = poses.inliers.iter().copied().filter(|&i| i as usize >= scene.points1.len());
+        let polished = polish(&mut poses, start);
+        let before = *polished.motion();
+        let after = *refine_without_chance(&mut poses, polished).motion();
+        let inliers = poses.score(after, 1.5).inliers;
+        let more = inliers.into_iter().filter(|&i| i as usize >= scene.points1.len());
         (more.collect(), [before, after])
     }
 

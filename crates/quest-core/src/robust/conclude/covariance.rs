@@ -28,7 +28,6 @@ use crate::robust::data::observations::Observations;
 use crate::robust::refine::epipolar::{One, Subset};
 use crate::robust::refine::loss::LEAST_SQUARES;
 use crate::robust::refine::point_transfer::rotation_hessian;
-use crate::robust::search::pose_score::Scored;
 
 /// Inliers, at most, that the normal equations are summed over.
 const ENOUGH: usize = 2_000;
@@ -39,13 +38,12 @@ const SINGULAR: f64 = 1e-12;
 /// The covariance of the five parameters of a motion.
 fn of_motion(
     observations: &Observations,
-    inliers: &[u32],
     polished: &Polished,
     false_matches: &Columns,
 ) -> Option<Matrix5<f64>> {
+    let (motion, inliers) = (polished.motion(), &polished.pose.inliers);
     let some = &inliers[..inliers.len().min(ENOUGH)];
     let share = inliers.len() as f64 / some.len() as f64;
-    let motion = &polished.scored.motion;
     let points = probable_points(observations, some, polished);
     let indices: Vec<u32> = (0..).take(points.len()).collect();
     let hessian = Subset::new(&points, &indices).equations(motion, &LEAST_SQUARES).hessian * (0.5 * share);
@@ -75,7 +73,7 @@ fn inverse(hessian: &Matrix5<f64>) -> Option<Matrix5<f64>> {
 /// The inliers, exactly as the motion sees them, with inverse depths one standard deviation before and behind what they most
 /// probably are: of both together the mean and the square are right.
 fn probable_points(observations: &Observations, inliers: &[u32], polished: &Polished) -> Columns {
-    let (motion, columns) = (&polished.scored.motion, &observations.columns);
+    let (motion, columns) = (polished.motion(), &observations.columns);
     let depths = InverseDepth::all(columns, motion, inliers);
     let usual = Usual::new(&depths);
     let points = (0..2 * depths.len()).map(|k| {
@@ -89,7 +87,7 @@ fn probable_points(observations: &Observations, inliers: &[u32], polished: &Poli
 
 /// The mean of `ψ² H⁻¹ J Jᵀ H⁻¹ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
 fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matrix5<f64>) -> Matrix5<f64> {
-    let Polished { scored: Scored { motion, .. }, loss, limit, .. } = polished;
+    let (motion, Polished { loss, limit, .. }) = (polished.motion(), polished);
     let mut sum = Matrix5::zeros();
     for index in false_matches.agreeing(motion, *limit) {
         let own = One::new(false_matches, index, motion, loss, inverse);
@@ -102,14 +100,13 @@ fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matri
 /// The covariance of `(ω, t_21)` of a motion whose translation has this length.
 pub(crate) fn of_pose(
     observations: &Observations,
-    inliers: &[u32],
     polished: &Polished,
     size: Length,
     false_matches: &Columns,
 ) -> Option<Matrix6<f64>> {
     // As the square of a root no variance is negative, however much of the others cancels.
-    let five = of_motion(observations, inliers, polished, false_matches)?.cholesky()?.unpack();
-    let motion = &polished.scored.motion;
+    let five = of_motion(observations, polished, false_matches)?.cholesky()?.unpack();
+    let motion = polished.motion();
     let tangent = tangent_basis(&motion.direction);
     let slope = size.slope(&tangent);
     let mut jacobian = SMatrix::<f64, 6, 5>::zeros();
@@ -174,12 +171,12 @@ mod tests {
         let order = (0..matches.len()).collect();
         let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
         let mut poses = PoseScorer::new(&observations, Score::default());
-        let scored = poses.score(motion, 1.5);
-        assert_eq!(poses.inliers.len(), matches.len());
-        let polished = Polished { scored, sigma: 0.5, loss: HeavyTailed::new(2.5), limit: 4.5 };
+        let pose = poses.score(motion, 1.5);
+        assert_eq!(pose.inliers.len(), matches.len());
+        let polished = Polished { pose, sigma: 0.5, loss: HeavyTailed::new(2.5), limit: 4.5 };
         let false_matches = false_alarms::false_matches(&observations);
-        let five = of_motion(&observations, &poses.inliers, &polished, &false_matches).unwrap();
-        let subset = Subset::new(&observations.columns, &poses.inliers);
+        let five = of_motion(&observations, &polished, &false_matches).unwrap();
+        let subset = Subset::new(&observations.columns, &polished.pose.inliers);
         let plain = subset.equations(&motion, &LEAST_SQUARES).hessian.cholesky().unwrap().inverse() * 0.25;
         [five, plain].map(|c| c.fixed_view::<2, 2>(3, 3).determinant())
     }

@@ -14,7 +14,7 @@
 
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
-use crate::robust::search::pose_score::PoseScorer;
+use crate::robust::search::pose_score::ScoredPose;
 use crate::solver::shared::motion::Motion;
 
 /// False matches that are looked at.
@@ -26,18 +26,12 @@ const WIDE: f64 = 3.0;
 /// Real solutions of a sample, on average.
 const SOLUTIONS: f64 = 4.0;
 
-/// The base ten logarithm of the number of false alarms of a motion whose inliers `poses` holds, found among so many samples.
-pub(crate) fn log_false_alarms(
-    poses: &PoseScorer,
-    motion: &Motion,
-    iterations: usize,
-    false_matches: &Columns,
-) -> f64 {
-    let observations = poses.observations;
-    let chance = chance_of_a_pixel(false_matches, motion, poses.threshold());
-    let mut errors: Vec<f64> = poses.inliers.iter().map(|&i| poses.residuals()[i as usize].abs()).collect();
+/// The base ten logarithm of the number of false alarms of a pose that was found among so many samples.
+pub(crate) fn log_false_alarms(pose: &ScoredPose, iterations: usize, false_matches: &Columns) -> f64 {
+    let chance = chance_of_a_pixel(false_matches, &pose.scored.motion);
+    let mut errors: Vec<f64> = pose.inlier_residuals().map(f64::abs).collect();
     errors.sort_unstable_by(f64::total_cmp);
-    least_log_false_alarms(observations.len(), &errors, chance, SOLUTIONS * iterations as f64)
+    least_log_false_alarms(pose.residuals().len(), &errors, chance, SOLUTIONS * iterations as f64)
 }
 
 /// The same for the inliers' errors in ascending order.
@@ -60,8 +54,8 @@ pub(crate) fn false_matches(observations: &Observations) -> Columns {
 }
 
 /// The share of false matches that agree with a motion to one pixel.
-fn chance_of_a_pixel(false_matches: &Columns, motion: &Motion, threshold: f64) -> f64 {
-    let wide = WIDE * threshold;
+fn chance_of_a_pixel(false_matches: &Columns, motion: &Motion) -> f64 {
+    let wide = WIDE * false_matches.threshold();
     let agreeing = 1.0 + false_matches.agreeing(motion, wide).len() as f64;
     agreeing / (1.0 + false_matches.len() as f64) / wide
 }

@@ -3,7 +3,7 @@
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::refine::loss::{HeavyTailed, Truncated};
 use crate::robust::refine::noise;
-use crate::robust::search::pose_score::{PoseScorer, Scored};
+use crate::robust::search::pose_score::{PoseScorer, Scored, ScoredPose};
 use crate::solver::shared::motion::Motion;
 
 /// Steps of each refinement.
@@ -24,9 +24,10 @@ const WIDE: f64 = 9.0;
 pub(crate) const FEWEST: usize = 6;
 
 /// A refined pose and its noise.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Polished {
-    pub(crate) scored: Scored,
+    /// The pose, its inliers within the threshold.
+    pub(crate) pose: ScoredPose,
     /// The standard deviation of the inliers' residuals, in pixels.
     pub(crate) sigma: f64,
     /// The loss of the last refinement, and how far away, in pixels, a match still had a say.
@@ -34,46 +35,55 @@ pub(crate) struct Polished {
     pub(crate) limit: f64,
 }
 
-/// Refines a pose by least squares over its inliers, measures the noise, and refines it with a loss of that scale. The
-/// inliers that [`PoseScorer`] holds afterwards are those of the result.
+impl Polished {
+    pub(crate) fn motion(&self) -> &Motion {
+        &self.pose.scored.motion
+    }
+
+    /// The same with another pose, and the noise of that.
+    pub(crate) fn with_pose(self, pose: ScoredPose, threshold: f64) -> Self {
+        let sigma = noise::estimate(pose.inlier_residuals(), threshold);
+        Self { pose, sigma, ..self }
+    }
+}
+
+/// Refines a pose by least squares over its inliers, measures the noise, and refines it with a loss of that scale.
 pub(crate) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     let threshold = poses.threshold();
-    let mut best = poses.score(start, threshold);
-    let mut motion = start;
-    if poses.inliers.len() >= FEWEST {
-        let some = poses.inliers.len().min(ENOUGH);
-        let subset = Subset::new(&poses.observations.columns, &poses.inliers[..some]);
+    let mut pose = poses.score(start, threshold);
+    if pose.inliers.len() >= FEWEST {
+        let mut motion = start;
+        let some = pose.inliers.len().min(ENOUGH);
+        let subset = Subset::new(&poses.observations.columns, &pose.inliers[..some]);
         refine(&subset, &mut motion, &Truncated::new(threshold), FINE, STEPS);
-        take_better(poses, &mut best, motion);
+        if let Some(better) = best_of(poses, &motion).filter(|found| found.cost < pose.scored.cost) {
+            poses.recycle(pose);
+            pose = poses.score(better.motion, threshold);
+        }
     }
-    let shown = sigma(poses, &best.motion);
-    let noise = noise::prudent(shown, poses.inliers.len(), threshold);
+    let shown = noise::estimate(pose.inlier_residuals(), threshold);
+    let noise = noise::prudent(shown, pose.inliers.len(), threshold);
     let limit = WIDE * noise;
-    poses.score(best.motion, limit);
-    let residuals = poses.inliers.iter().map(|&i| poses.residuals()[i as usize]);
-    let width = if noise::is_normal(residuals, shown) { WIDTH_OF_NORMAL } else { WIDTH };
-    let loss = HeavyTailed::new(width * noise);
-    if poses.inliers.len() >= FEWEST {
-        let mut motion = best.motion;
-        let subset = Subset::new(&poses.observations.columns, &poses.inliers);
+    let wide = poses.score(pose.scored.motion, limit);
+    let is_normal = noise::is_normal(wide.inlier_residuals(), shown);
+    let loss = HeavyTailed::new(noise * if is_normal { WIDTH_OF_NORMAL } else { WIDTH });
+    if wide.inliers.len() >= FEWEST {
+        let mut motion = pose.scored.motion;
+        let subset = Subset::new(&poses.observations.columns, &wide.inliers);
         refine(&subset, &mut motion, &loss, FINE, STEPS);
-        let scored = poses.best_pose(&motion.essential(), threshold);
-        best = scored.unwrap_or(best);
+        let motion = best_of(poses, &motion).map_or(pose.scored.motion, |best| best.motion);
+        poses.recycle(pose);
+        pose = poses.score(motion, threshold);
     }
-    let sigma = sigma(poses, &best.motion);
-    Polished { scored: best, sigma, loss, limit }
+    poses.recycle(wide);
+    let sigma = noise::estimate(pose.inlier_residuals(), threshold);
+    Polished { pose, sigma, loss, limit }
 }
 
-fn take_better(poses: &mut PoseScorer, best: &mut Scored, motion: Motion) {
-    if let Some(scored) = poses.best_pose(&motion.essential(), poses.threshold())
-        && scored.cost < best.cost
-    {
-        *best = scored;
-    }
-}
-
-/// The noise of the inliers of a pose; leaves its inliers in `poses`.
-pub(crate) fn sigma(poses: &mut PoseScorer, motion: &Motion) -> f64 {
-    poses.score(*motion, poses.threshold());
-    noise::estimate(poses.inliers.iter().map(|&i| poses.residuals()[i as usize]), poses.threshold())
+/// The best of the four poses with the essential matrix of a motion.
+pub(crate) fn best_of(poses: &mut PoseScorer, motion: &Motion) -> Option<Scored> {
+    let pose = poses.best_pose(&motion.essential(), poses.threshold())?;
+    let scored = pose.scored;
+    poses.recycle(pose);
+    Some(scored)
 }

@@ -14,6 +14,7 @@
 use nalgebra::UnitQuaternion;
 
 use crate::alignment::best_rotation;
+use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::plane::Plane;
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::Framed;
@@ -21,7 +22,6 @@ use crate::robust::estimate::{Evidence, Model};
 use crate::robust::refine::loss::SCALE;
 use crate::robust::refine::loss::{CAP, GemanMcClure};
 use crate::robust::refine::point_transfer::refine_rotation;
-use crate::robust::search::pose_score::PoseScorer;
 
 /// A rotation alone is enough below this.
 const ROTATION: f64 = 3.0;
@@ -60,21 +60,16 @@ pub(crate) struct Verdict {
     pub(crate) is_exact_plane: bool,
 }
 
-/// Compares the models over the inliers that `poses` holds, those of a pose with rotation `q_21` and noise `sigma` (pixels).
-pub(crate) fn choose(
-    poses: &PoseScorer,
-    q_21: &UnitQuaternion<f64>,
-    plane: Option<&Plane>,
-    sigma: f64,
-) -> Verdict {
-    let observations = poses.observations;
-    let inliers = &poses.inliers[..poses.inliers.len().min(ENOUGH)];
-    let noise = sigma;
-    let sigma = noise.max(LEAST_NOISE * poses.threshold());
+/// Compares the models over the inliers of a pose.
+pub(crate) fn choose(observations: &Observations, polished: &Polished, plane: Option<&Plane>) -> Verdict {
+    let pose = &polished.pose;
+    let inliers = &pose.inliers[..pose.inliers.len().min(ENOUGH)];
+    let noise = polished.sigma;
+    let sigma = noise.max(LEAST_NOISE * observations.columns.threshold());
     let framed = observations.framed(inliers);
-    let q_21 = rotation_alone(observations, inliers, &framed, q_21, sigma);
+    let q_21 = rotation_alone(observations, inliers, &framed, &polished.motion().q_21, sigma);
     let r_21 = q_21.to_rotation_matrix().into_inner();
-    let general: Vec<f64> = inliers.iter().map(|&i| poses.residuals()[i as usize].powi(2)).collect();
+    let general: Vec<f64> = inliers.iter().map(|&i| pose.residuals()[i as usize].powi(2)).collect();
     let rotation = framed.square_errors(&r_21);
     let planar = plane.map(|plane| framed.square_errors(&plane.homography));
     let excess = |model: &[f64], sigma: f64| {

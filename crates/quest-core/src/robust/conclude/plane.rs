@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::inverse_depth::InverseDepth;
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::loss::SCALE;
@@ -38,14 +39,9 @@ pub(crate) struct Plane {
     pub(crate) motions: [Option<Motion>; 2],
 }
 
-/// Fits a plane to the inliers of a motion, `sigma` their noise in pixels.
-pub(crate) fn fit(
-    observations: &Observations,
-    motion: &Motion,
-    inliers: &[u32],
-    sigma: f64,
-    rng: &mut ChaCha8Rng,
-) -> Option<Plane> {
+/// Fits a plane to the inliers of a pose.
+pub(crate) fn fit(observations: &Observations, polished: &Polished, rng: &mut ChaCha8Rng) -> Option<Plane> {
+    let (motion, inliers, sigma) = (polished.motion(), &polished.pose.inliers, polished.sigma);
     let judges = &inliers[..inliers.len().min(JUDGES)];
     let depths = InverseDepth::all(&observations.columns, motion, judges);
     let g = most_common_plane(&depths, CAP * sigma * sigma, rng)?;

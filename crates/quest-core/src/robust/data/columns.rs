@@ -30,16 +30,16 @@ pub(crate) struct Columns {
     all: [Vec<f64>; 6],
 }
 
-/// What a motion makes of matches.
+/// The residuals of matches under a motion, and on which side of the cameras their points are.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Look {
+pub(crate) struct Residuals {
     /// The signed Sampson error of every match in pixels.
-    pub(crate) residuals: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Bit `k` of a match: its point may be in front of both cameras in pose `k` of [`POSES`].
     pub(crate) sides: Vec<u32>,
 }
 
-impl Look {
+impl Residuals {
     /// Whether the point of a match may be in front of both cameras in a pose.
     pub(crate) fn is_in_front(&self, index: usize, pose: usize) -> bool {
         is_in_front(self.sides[index], pose)
@@ -141,32 +141,32 @@ impl Columns {
 
     /// The matches within `limit` pixels of a motion that are in front of both cameras.
     pub(crate) fn agreeing(&self, motion: &Motion, limit: f64) -> Vec<u32> {
-        let mut look = Look::default();
-        self.look(&motion.essential(), motion, &mut look);
+        let mut all = Residuals::default();
+        self.residuals(&motion.essential(), motion, &mut all);
         let agrees = |&i: &u32| {
             let i = i as usize;
-            look.residuals[i].abs() < limit && look.is_in_front(i, 0)
+            all.values[i].abs() < limit && all.is_in_front(i, 0)
         };
         (0_u32..).take(self.len()).filter(agrees).collect()
     }
 
     /// Fills `out` for an essential matrix of any scale and a motion with that matrix.
-    pub(crate) fn look(&self, e: &Matrix3<f64>, motion: &Motion, out: &mut Look) {
+    pub(crate) fn residuals(&self, e: &Matrix3<f64>, motion: &Motion, out: &mut Residuals) {
         let view = View::new(self, e, motion);
-        out.residuals.resize(self.len(), 0.0);
+        out.values.resize(self.len(), 0.0);
         out.sides.resize(self.len(), 0);
-        widest(Looking { view: &view, columns: self, out });
+        widest(Filling { view: &view, columns: self, out });
     }
 }
 
-/// A look at all columns.
-struct Looking<'a> {
+/// The residuals of all columns.
+struct Filling<'a> {
     view: &'a View,
     columns: &'a Columns,
-    out: &'a mut Look,
+    out: &'a mut Residuals,
 }
 
-impl Work for Looking<'_> {
+impl Work for Filling<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -179,7 +179,7 @@ impl Work for Looking<'_> {
     }
 }
 
-/// The coefficients of a look.
+/// The coefficients of the residuals under a motion.
 struct View {
     /// `F`, `D2 R D1`, row by row.
     f: [f64; 9],
@@ -215,9 +215,9 @@ impl View {
     }
 
     #[inline(always)]
-    fn fill<const SPHERE: bool>(&self, columns: &Columns, out: &mut Look) {
+    fn fill<const SPHERE: bool>(&self, columns: &Columns, out: &mut Residuals) {
         let chunks = columns.all.each_ref().map(|c| c.as_chunks::<WIDTH>());
-        let (residuals, last_residuals) = out.residuals.as_chunks_mut::<WIDTH>();
+        let (residuals, last_residuals) = out.values.as_chunks_mut::<WIDTH>();
         let (sides, last_sides) = out.sides.as_chunks_mut::<WIDTH>();
         for (i, (residuals, sides)) in residuals.iter_mut().zip(sides).enumerate() {
             self.few::<SPHERE>(chunks.map(|c| &c.0[i]), residuals, sides);
@@ -308,10 +308,10 @@ mod tests {
         (all, scene.truth)
     }
 
-    fn look(all: &Observations, motion: &Motion) -> Look {
-        let mut look = Look::default();
-        all.columns.look(&motion.essential(), motion, &mut look);
-        look
+    fn residuals(all: &Observations, motion: &Motion) -> Residuals {
+        let mut residuals = Residuals::default();
+        all.columns.residuals(&motion.essential(), motion, &mut residuals);
+        residuals
     }
 
     #[test]
@@ -320,7 +320,7 @@ mod tests {
             let (all, truth) = observations(is_sphere);
             let motion = Motion { q_21: truth.q_21, direction: truth.t_21.normalize() };
             let e = motion.essential();
-            for (m, r) in all.matches.iter().zip(look(&all, &motion).residuals) {
+            for (m, r) in all.matches.iter().zip(residuals(&all, &motion).values) {
                 let [a, b] = [m.bearing1() / m.bearing1().z, m.bearing2() / m.bearing2().z];
                 let (line2, line1) = (e * a, e.tr_mul(&b));
                 let on_plane = b.dot(&line2) / (line2.xy().norm_squared() + line1.xy().norm_squared()).sqrt();
@@ -339,10 +339,10 @@ mod tests {
             let opposite = |m: Motion| Motion { direction: -m.direction, ..m };
             let starts = [motion, opposite(motion), motion.twisted(), opposite(motion.twisted())];
             for (k, start) in starts.iter().enumerate() {
-                let look = look(&all, start);
+                let seen = residuals(&all, start);
                 // Twice twisted is the rotation again.
                 let found: Vec<_> =
-                    (0..POSES).filter(|&pose| (0..13).all(|i| look.is_in_front(i, pose))).collect();
+                    (0..POSES).filter(|&pose| (0..13).all(|i| seen.is_in_front(i, pose))).collect();
                 assert_eq!(found, [k]);
             }
         }

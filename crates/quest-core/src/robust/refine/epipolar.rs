@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Matrix5, Vector5};
 use crate::algebra::vectors::widest::{Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::robust::data::columns::Columns;
-use crate::robust::refine::loss::{LEAST_SQUARES, Loss};
+use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
 use crate::solver::shared::motion::{Motion, damped_step};
 
 /// Matches that are worked on at once.
@@ -69,7 +69,7 @@ impl One {
         all: &Columns,
         index: u32,
         motion: &Motion,
-        loss: &impl Loss,
+        loss: &impl RobustLoss,
         inverse: &Matrix5<f64>,
     ) -> Self {
         let Equations { cost: square, hessian, gradient } =
@@ -99,7 +99,7 @@ impl Subset {
     }
 
     /// The cost of a motion and the normal equations of a step from it.
-    pub(crate) fn equations(&self, motion: &Motion, loss: &impl Loss) -> Equations {
+    pub(crate) fn equations(&self, motion: &Motion, loss: &impl RobustLoss) -> Equations {
         let derivatives = motion.essential_derivatives(&tangent_basis(&motion.direction));
         let [d1, d2] = &self.inverse_scales;
         let f = fundamental(&motion.essential(), d1, d2);
@@ -112,7 +112,7 @@ impl Subset {
         &self,
         f: &[f64; 9],
         df: &[[f64; 9]; 5],
-        loss: &impl Loss,
+        loss: &impl RobustLoss,
     ) -> Equations {
         let mut cost = [0.0; WIDTH];
         let mut upper = [[0.0; WIDTH]; 15];
@@ -174,7 +174,7 @@ struct Accumulation<'a, L> {
     loss: L,
 }
 
-impl<L: Loss> Work for Accumulation<'_, L> {
+impl<L: RobustLoss> Work for Accumulation<'_, L> {
     type Output = Equations;
 
     #[inline(always)]
@@ -239,7 +239,13 @@ pub(crate) fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f6
 }
 
 /// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, with at most so many steps.
-pub(crate) fn refine(subset: &Subset, motion: &mut Motion, loss: &impl Loss, until: f64, max_steps: usize) {
+pub(crate) fn refine(
+    subset: &Subset,
+    motion: &mut Motion,
+    loss: &impl RobustLoss,
+    until: f64,
+    max_steps: usize,
+) {
     let mut damping = 1e-4;
     let mut current = subset.equations(motion, loss);
     for _ in 0..max_steps {

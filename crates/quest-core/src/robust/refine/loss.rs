@@ -7,7 +7,7 @@ pub(crate) const CAP: f64 = 9.21;
 pub(crate) const SCALE: f64 = 3.0;
 
 /// A loss `ρ(r²)` with the weight `ρ'(r²)`.
-pub(crate) trait Loss: Copy {
+pub(crate) trait RobustLoss: Copy {
     /// The cost, and its derivative by the squared residual.
     fn cost_and_weight(&self, square: f64) -> (f64, f64);
 }
@@ -105,14 +105,14 @@ impl GemanMcClure {
     }
 }
 
-impl Loss for Truncated {
+impl RobustLoss for Truncated {
     #[inline(always)]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         if square < self.square_limit { (square, 1.0) } else { (self.square_limit, 0.0) }
     }
 }
 
-impl Loss for Biweight {
+impl RobustLoss for Biweight {
     #[inline(always)]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let rest = (1.0 - square * self.inverse_square).max(0.0);
@@ -120,7 +120,7 @@ impl Loss for Biweight {
     }
 }
 
-impl Loss for HeavyTailed {
+impl RobustLoss for HeavyTailed {
     #[inline(always)]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
@@ -129,7 +129,7 @@ impl Loss for HeavyTailed {
     }
 }
 
-impl Loss for GemanMcClure {
+impl RobustLoss for GemanMcClure {
     #[inline(always)]
     fn cost_and_weight(&self, square: f64) -> (f64, f64) {
         let share = 1.0 / (1.0 + square * self.inverse_square);
@@ -141,7 +141,7 @@ impl Loss for GemanMcClure {
 mod tests {
     use super::*;
 
-    fn weight_is_the_derivative(loss: impl Loss) {
+    fn weight_is_the_derivative(loss: impl RobustLoss) {
         let h = 1e-6;
         for square in [0.0_f64, 0.3, 1.0, 2.5, 3.9, 4.1, 30.0] {
             let square = square + 2.0 * h;

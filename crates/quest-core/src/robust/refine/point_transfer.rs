@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use crate::algebra::vectors::widest::{Work, widest};
 use crate::robust::data::point_transfer::{Framed, Lanes, WIDTH, rows, whitened};
-use crate::robust::refine::loss::{LEAST_SQUARES, Loss};
+use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
 
 /// A descent is at its end when the next step gains no more than this in units of the mean cost of a match.
 const FINE: f64 = 1e-3;
@@ -53,7 +53,7 @@ impl Parameters<3> for Turn {
 fn equations<const P: usize, R: Parameters<P>>(
     matches: &Framed,
     h: &Matrix3<f64>,
-    loss: &impl Loss,
+    loss: &impl RobustLoss,
     parameters: R,
 ) -> Equations<P> {
     widest(Accumulation { matches, h: rows(h), loss: *loss, parameters })
@@ -67,7 +67,7 @@ struct Accumulation<'a, const P: usize, L, R: Parameters<P>> {
     parameters: R,
 }
 
-impl<const P: usize, L: Loss, R: Parameters<P>> Work for Accumulation<'_, P, L, R> {
+impl<const P: usize, L: RobustLoss, R: Parameters<P>> Work for Accumulation<'_, P, L, R> {
     type Output = Equations<P>;
 
     #[inline(always)]
@@ -159,7 +159,7 @@ fn minimise<const P: usize, M: Clone>(
 pub(crate) fn refine_homography(
     matches: &Framed,
     h: &mut Matrix3<f64>,
-    loss: &impl Loss,
+    loss: &impl RobustLoss,
     max_steps: usize,
 ) -> f64 {
     *h /= h.norm();
@@ -176,7 +176,7 @@ pub(crate) fn refine_homography(
 pub(crate) fn refine_rotation(
     matches: &Framed,
     q_21: &mut UnitQuaternion<f64>,
-    loss: &impl Loss,
+    loss: &impl RobustLoss,
     max_steps: usize,
 ) -> f64 {
     minimise(

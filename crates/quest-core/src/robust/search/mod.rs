@@ -18,7 +18,7 @@ use crate::robust::data::observations::Observations;
 use crate::robust::options::{KnownDirection, Options};
 use crate::robust::refine::epipolar::{COARSE, Subset, refine};
 use crate::robust::refine::loss::Biweight;
-use crate::robust::search::pose_score::{PoseScorer, Scored};
+use crate::robust::search::pose_score::{PoseScorer, Scored, ScoredPose};
 use crate::robust::search::sampling::{MAX_SAMPLE, Sampler};
 use crate::robust::search::search_score::{MANY, REACH, Scorer};
 use crate::solver::SolverName;
@@ -59,6 +59,17 @@ pub(crate) struct Limits<'a> {
     pub(crate) is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
+/// What the search found.
+#[derive(Clone, Debug)]
+pub(crate) struct SearchResult {
+    /// The best pose.
+    pub(crate) best: Scored,
+    /// With few matches, every pose that was found, refined.
+    pub(crate) of_few: Vec<Scored>,
+    /// Samples drawn.
+    pub(crate) iterations: usize,
+}
+
 /// The search for the best pose.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
@@ -69,15 +80,15 @@ pub(crate) struct Search<'a> {
     samples: Vec<[usize; MAX_SAMPLE]>,
     direction: Option<KnownDirection>,
     scorer: Scorer<'a>,
-    pub(crate) poses: PoseScorer<'a>,
+    poses: PoseScorer<'a>,
     /// The best cost of a hypothesis before refinement.
     best_hypothesis: f64,
     /// The best pose.
-    pub(crate) best: Option<Scored>,
-    /// Of few matches, every pose that was found, refined.
-    pub(crate) all: Vec<Scored>,
+    best: Option<Scored>,
+    /// With few matches, every pose that was found, refined.
+    all: Vec<Scored>,
     /// Samples drawn.
-    pub(crate) iterations: usize,
+    iterations: usize,
     hypotheses: Vec<Matrix3<f64>>,
 }
 
@@ -132,6 +143,12 @@ impl<'a> Search<'a> {
             enough = self.enough(limits);
             block = BLOCK;
         }
+    }
+
+    /// What was found, `None` where there is no pose, and the scorer of poses for what follows.
+    pub(crate) fn into_result(self) -> (PoseScorer<'a>, Option<SearchResult>) {
+        let Self { poses, best, all, iterations, .. } = self;
+        (poses, best.map(|best| SearchResult { best, of_few: all, iterations }))
     }
 
     /// How many samples are enough.
@@ -198,7 +215,9 @@ impl<'a> Search<'a> {
             if self.scorer.score(e, self.best_hypothesis).is_none() {
                 continue;
             }
-            let Some(scored) = self.poses.best_pose(e, self.width()) else { continue };
+            let Some(pose) = self.poses.best_pose(e, self.width()) else { continue };
+            let scored = pose.scored;
+            self.poses.recycle(pose);
             if scored.cost < self.best_hypothesis && self.allows(&scored) {
                 self.best_hypothesis = scored.cost;
                 best = Some(scored.motion);
@@ -211,8 +230,9 @@ impl<'a> Search<'a> {
 
     /// Of few matches every hypothesis is refined and kept: the scores hardly tell them apart.
     fn consider_one_of_few(&mut self, e: &Matrix3<f64>) {
-        let Some(scored) = self.poses.best_pose(e, self.width()).filter(|s| self.allows(s)) else { return };
-        let optimised = self.optimise(scored);
+        let pose = self.poses.best_pose(e, self.width());
+        let Some(pose) = pose.filter(|pose| self.allows(&pose.scored)) else { return };
+        let optimised = self.optimise(pose);
         self.all.push(optimised);
         let order = |s: &Scored| ((s.cost / EQUAL).round(), s.motion.q_21.angle());
         if self.best.is_none_or(|best| order(&optimised) < order(&best)) {
@@ -222,8 +242,8 @@ impl<'a> Search<'a> {
 
     /// Refines a pose, and keeps it where it is better.
     pub(crate) fn consider_pose(&mut self, motion: Motion) {
-        let scored = self.poses.score(motion, self.width());
-        let optimised = self.optimise(scored);
+        let pose = self.poses.score(motion, self.width());
+        let optimised = self.optimise(pose);
         self.keep(optimised);
     }
 
@@ -243,25 +263,29 @@ impl<'a> Search<'a> {
         REACH * self.poses.threshold()
     }
 
-    /// Refines a pose that has just been scored over its inliers.
-    fn optimise(&mut self, start: Scored) -> Scored {
+    /// Refines a pose over its inliers.
+    fn optimise(&mut self, start: ScoredPose) -> Scored {
         let loss = Biweight::new(WIDTH * self.poses.threshold());
         let mut best = start;
         for _ in 0..ROUNDS {
-            let count = self.poses.inliers.len().min(MATCHES);
+            let count = best.inliers.len().min(MATCHES);
             if count < MAX_SAMPLE.min(self.observations.len()) {
                 break;
             }
-            let subset = Subset::new(&self.observations.columns, &self.poses.inliers[..count]);
-            let mut motion = best.motion;
+            let subset = Subset::new(&self.observations.columns, &best.inliers[..count]);
+            let mut motion = best.scored.motion;
             refine(&subset, &mut motion, &loss, COARSE, STEPS);
-            let scored = self.poses.best_pose(&motion.essential(), self.width());
-            match scored {
-                Some(scored) if scored.cost < best.cost && self.allows(&scored) => best = scored,
-                _ => break,
+            let Some(pose) = self.poses.best_pose(&motion.essential(), self.width()) else { break };
+            if pose.scored.cost < best.scored.cost && self.allows(&pose.scored) {
+                self.poses.recycle(std::mem::replace(&mut best, pose));
+            } else {
+                self.poses.recycle(pose);
+                break;
             }
         }
-        best
+        let scored = best.scored;
+        self.poses.recycle(best);
+        scored
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::vectors::widest::{Work, widest};
 use crate::lanes::Loss;
-use crate::robust::data::columns::{Look, POSES, is_in_front};
+use crate::robust::data::columns::{POSES, Residuals, is_in_front};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::loss::CAP;
 use crate::robust::search::search_score::{MANY, REACH, cost};
@@ -32,42 +32,80 @@ pub(crate) struct Scored {
     pub(crate) support: usize,
 }
 
-/// Scores poses, with the memory to do so.
+/// A pose with its score and with what it makes of every match.
+#[derive(Clone, Debug)]
+pub(crate) struct ScoredPose {
+    pub(crate) scored: Scored,
+    /// The matches within the limit asked for that are in front of both cameras, in order.
+    pub(crate) inliers: Vec<u32>,
+    residuals: Residuals,
+    /// Which of the four poses of `residuals` this one is.
+    which: usize,
+}
+
+impl ScoredPose {
+    /// The signed Sampson errors of all matches, in pixels.
+    pub(crate) fn residuals(&self) -> &[f64] {
+        &self.residuals.values
+    }
+
+    /// The signed Sampson errors of the inliers, in pixels.
+    pub(crate) fn inlier_residuals(&self) -> impl ExactSizeIterator<Item = f64> {
+        self.inliers.iter().map(|&i| self.residuals.values[i as usize])
+    }
+
+    /// The sum of the squared residuals in units of the noise `sigma`, none above [`CAP`], which a point behind a camera
+    /// counts as well.
+    pub(crate) fn misfit(&self, sigma: f64) -> f64 {
+        let square = |(i, r): (usize, &f64)| {
+            let square = (r / sigma).powi(2).min(CAP);
+            if self.residuals.is_in_front(i, self.which) { square } else { CAP }
+        };
+        self.residuals().iter().enumerate().map(square).sum()
+    }
+}
+
+/// Scores poses.
 #[derive(Debug)]
 pub(crate) struct PoseScorer<'a> {
     pub(crate) observations: &'a Observations,
     loss: Loss,
-    /// The residuals of the pose that was scored last, in pixels, and on which side of the cameras its points are.
-    look: Look,
-    /// Its matches within the limit asked for that are in front of both cameras, in order.
-    pub(crate) inliers: Vec<u32>,
+    /// The memory of poses that are not needed any more.
+    spare: Vec<(Residuals, Vec<u32>)>,
 }
 
 impl<'a> PoseScorer<'a> {
     pub(crate) fn new(observations: &'a Observations, loss: Loss) -> Self {
         let loss = if observations.len() < MANY { Loss::Truncated } else { loss };
-        Self { observations, loss, look: Look::default(), inliers: Vec::new() }
+        Self { observations, loss, spare: Vec::new() }
     }
 
-    /// The best of the four poses of an essential matrix. [`Self::inliers`] are those within `limit` pixels.
-    pub(crate) fn best_pose(&mut self, e: &Matrix3<f64>, limit: f64) -> Option<Scored> {
+    /// Takes the memory of a pose that is not needed any more.
+    pub(crate) fn recycle(&mut self, pose: ScoredPose) {
+        self.spare.push((pose.residuals, pose.inliers));
+    }
+
+    /// The best of the four poses of an essential matrix, its inliers within `limit` pixels.
+    pub(crate) fn best_pose(&mut self, e: &Matrix3<f64>, limit: f64) -> Option<ScoredPose> {
         let rows = std::array::from_fn(|i| std::array::from_fn(|j| e[(i, j)]));
         let ([w, x, y, z], t) = decompose(&rows)?;
         let motion = Motion {
             q_21: UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)),
             direction: Vector3::from(t).normalize(),
         };
-        self.observations.columns.look(e, &motion, &mut self.look);
-        let pose = self.vote(limit);
-        let motion = if pose < 2 { motion } else { motion.twisted() };
-        let direction = if pose.is_multiple_of(2) { motion.direction } else { -motion.direction };
-        Some(self.finish(Motion { direction, ..motion }, pose, limit))
+        let (mut residuals, inliers) = self.spare.pop().unwrap_or_default();
+        self.observations.columns.residuals(e, &motion, &mut residuals);
+        let which = self.vote(&residuals, limit);
+        let motion = if which < 2 { motion } else { motion.twisted() };
+        let direction = if which.is_multiple_of(2) { motion.direction } else { -motion.direction };
+        Some(self.finish(Motion { direction, ..motion }, residuals, which, inliers, limit))
     }
 
-    /// The score of one pose.
-    pub(crate) fn score(&mut self, motion: Motion, limit: f64) -> Scored {
-        self.observations.columns.look(&motion.essential(), &motion, &mut self.look);
-        self.finish(motion, 0, limit)
+    /// The score of one pose, its inliers within `limit` pixels.
+    pub(crate) fn score(&mut self, motion: Motion, limit: f64) -> ScoredPose {
+        let (mut residuals, inliers) = self.spare.pop().unwrap_or_default();
+        self.observations.columns.residuals(&motion.essential(), &motion, &mut residuals);
+        self.finish(motion, residuals, 0, inliers, limit)
     }
 
     /// The inlier threshold in pixels.
@@ -75,62 +113,55 @@ impl<'a> PoseScorer<'a> {
         self.observations.columns.threshold()
     }
 
-    /// The sum of the squares of the residuals of the pose that was scored last, at this noise, none above [`CAP`].
-    pub(crate) fn misfit(&self, sigma: f64) -> f64 {
-        let square = |(i, r): (usize, &f64)| {
-            let square = (r / sigma).powi(2).min(CAP);
-            if self.look.is_in_front(i, 0) { square } else { CAP }
-        };
-        self.residuals().iter().enumerate().map(square).sum()
-    }
-
-    /// The residuals of the pose that was scored last, in pixels.
-    pub(crate) fn residuals(&self) -> &[f64] {
-        &self.look.residuals
-    }
-
     /// The one of the four poses with most matches in front of both cameras.
-    fn vote(&self, limit: f64) -> usize {
+    fn vote(&self, of: &Residuals, limit: f64) -> usize {
         let limit = limit.max(REACH * self.threshold());
-        let residuals = self.residuals();
+        let residuals = &of.values;
         let voters = (0..residuals.len()).filter(|&i| residuals[i].abs() < limit);
         let mut votes = [0_usize; POSES];
         for i in voters.take(MAX_VOTES) {
             for (pose, votes) in votes.iter_mut().enumerate() {
-                *votes += usize::from(self.look.is_in_front(i, pose));
+                *votes += usize::from(of.is_in_front(i, pose));
             }
         }
         // The first of equals.
         (1..POSES).fold(0, |best, pose| if votes[pose] > votes[best] { pose } else { best })
     }
 
-    /// The score of a pose of the motion that was looked at, `motion` itself.
-    fn finish(&mut self, motion: Motion, pose: usize, limit: f64) -> Scored {
+    /// The score of pose `which` of the residuals, `motion` itself; `inliers` is memory to write to.
+    fn finish(
+        &self,
+        motion: Motion,
+        residuals: Residuals,
+        which: usize,
+        mut inliers: Vec<u32>,
+        limit: f64,
+    ) -> ScoredPose {
         let reach = REACH * self.threshold();
         let judging = Judging {
-            look: &self.look,
-            pose,
+            residuals: &residuals,
+            pose: which,
             loss: self.loss,
             inverse_reach: 1.0 / reach,
             judged: limit.max(reach),
             near: SUPPORT * self.threshold(),
         };
         let (cost, support) = widest(judging);
-        self.inliers.resize(self.look.residuals.len(), 0);
+        inliers.resize(residuals.values.len(), 0);
         let mut found = 0;
-        for (i, (index, r)) in (0_u32..).zip(&self.look.residuals).enumerate() {
+        for (i, (index, r)) in (0_u32..).zip(&residuals.values).enumerate() {
             // Written in any case, which takes less time than to ask.
-            self.inliers[found] = index;
-            found += usize::from(self.look.is_in_front(i, pose) & (r.abs() < limit));
+            inliers[found] = index;
+            found += usize::from(residuals.is_in_front(i, which) & (r.abs() < limit));
         }
-        self.inliers.truncate(found);
-        Scored { motion, cost, support }
+        inliers.truncate(found);
+        ScoredPose { scored: Scored { motion, cost, support }, inliers, residuals, which }
     }
 }
 
 /// Sums the loss of a pose, and counts its support.
 struct Judging<'a> {
-    look: &'a Look,
+    residuals: &'a Residuals,
     pose: usize,
     loss: Loss,
     inverse_reach: f64,
@@ -155,10 +186,10 @@ impl Judging<'_> {
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn sum(self, cost: impl Fn(f64) -> f64) -> (f64, usize) {
-        let Self { look, pose, inverse_reach, judged, near, .. } = self;
+        let Self { residuals: of, pose, inverse_reach, judged, near, .. } = self;
         let (mut sum, mut support) = ([0.0; WIDTH], [0.0; WIDTH]);
-        let (residuals, last_residuals) = look.residuals.as_chunks::<WIDTH>();
-        let (sides, last_sides) = look.sides.as_chunks::<WIDTH>();
+        let (residuals, last_residuals) = of.values.as_chunks::<WIDTH>();
+        let (sides, last_sides) = of.sides.as_chunks::<WIDTH>();
         let mut add = |j: usize, r: f64, sides: u32| {
             let (r, is_in_front) = (r.abs(), is_in_front(sides, pose));
             let loss = cost(r * inverse_reach);

@@ -1,0 +1,126 @@
+//! The answers of a model, their length and covariance: an estimate.
+
+use nalgebra::UnitQuaternion;
+
+use crate::RelativePose;
+use crate::robust::MIN_MATCHES;
+use crate::robust::conclude::Answer;
+use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plane, second_of_few};
+use crate::robust::conclude::covariance;
+use crate::robust::conclude::final_refinement::Polished;
+use crate::robust::conclude::length::{Length, Noise, length};
+use crate::robust::conclude::model::Verdict;
+use crate::robust::data::columns::Columns;
+use crate::robust::data::observations::Observations;
+use crate::robust::estimate::{Estimate, Model, RunnerUp};
+use crate::robust::search::SearchResult;
+use crate::robust::search::pose_score::{PoseScorer, Scored};
+use crate::robust::search::search_score::MANY;
+use crate::solver::shared::motion::Motion;
+use crate::structure::translation_direction;
+
+/// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
+const NEAR_POINT: f64 = 3.0;
+
+/// What is known of the matches when the answers are chosen.
+pub(crate) struct Conclusion<'a> {
+    pub(crate) polished: Polished,
+    pub(crate) others: &'a [Alternative],
+    pub(crate) verdict: Verdict,
+    pub(crate) false_matches: &'a Columns,
+}
+
+/// The estimate; `None` where the answer is left with too few inliers or without a covariance.
+pub(crate) fn report(
+    poses: &mut PoseScorer,
+    found: &SearchResult,
+    conclusion: Conclusion,
+    answer: Answer,
+) -> Option<Estimate> {
+    let observations = poses.observations;
+    let (mut motion, mut second) = answers(poses, found, &conclusion);
+    if let (Answer::Other, Some(second)) = (answer, &mut second) {
+        std::mem::swap(&mut motion, second);
+    }
+    let Conclusion { mut polished, verdict, false_matches, .. } = conclusion;
+    let (model, sigma) = (verdict.model, polished.sigma);
+    polished.pose = poses.score(motion, poses.threshold());
+    if model == Model::PureRotation {
+        let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
+        let limit = (NEAR_POINT * poses.threshold()).powi(2);
+        let mut squares = observations.framed(&polished.pose.inliers).square_errors(&r_21).into_iter();
+        polished.pose.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
+    }
+    let inliers = &polished.pose.inliers;
+    // A plane, a rotation, or one of the poses of few matches may be left with less than it takes.
+    if inliers.len() < MIN_MATCHES {
+        return None;
+    }
+    let noise = Noise { sigma, false_matches };
+    let size = length(observations, &motion, inliers, &noise);
+    let covariance = match model {
+        Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size),
+        _ => covariance::of_pose(observations, &polished, size, false_matches),
+    }?;
+    let mut mask = vec![false; observations.len()];
+    for &i in inliers {
+        mask[observations.order[i as usize]] = true;
+    }
+    Some(Estimate {
+        model,
+        pose: with_length(&motion, size),
+        covariance,
+        inlier_count: inliers.len(),
+        inliers: mask,
+        score: share(&polished.pose.scored, observations),
+        iterations: found.iterations,
+        runner_up: second.map(|motion| runner_up(poses, motion, &noise)),
+        evidence: verdict.evidence,
+        noise_px: sigma,
+    })
+}
+
+/// The motion that the model makes of the pose, and another that explains the matches nearly as well.
+fn answers(
+    poses: &mut PoseScorer,
+    found: &SearchResult,
+    conclusion: &Conclusion,
+) -> (Motion, Option<Motion>) {
+    let Conclusion { polished, others, verdict, .. } = conclusion;
+    let observations = poses.observations;
+    let is_few = observations.len() < MANY;
+    let (motion, mut second) = match verdict.model {
+        Model::Planar => both_of_plane(poses, others, polished.motion(), verdict.is_exact_plane),
+        Model::PureRotation => (still(observations, &polished.pose.inliers, verdict.q_21), None),
+        Model::General if is_few => (*polished.motion(), None),
+        Model::General => (*polished.motion(), as_likely(poses, others, polished)),
+    };
+    if verdict.model != Model::PureRotation && is_few {
+        second = second_of_few(&found.of_few, &motion);
+    }
+    (motion, second)
+}
+
+/// The motion of a camera that only turns: the direction of what translation is left.
+fn still(observations: &Observations, inliers: &[u32], q_21: UnitQuaternion<f64>) -> Motion {
+    let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
+    Motion { q_21, direction: translation_direction(&q_21, &matches) }
+}
+
+fn with_length(motion: &Motion, size: Length) -> RelativePose {
+    RelativePose::new(motion.q_21, motion.direction * size.value)
+}
+
+fn share(scored: &Scored, observations: &Observations) -> f64 {
+    (1.0 - scored.cost / observations.len() as f64).clamp(0.0, 1.0)
+}
+
+fn runner_up(poses: &mut PoseScorer, motion: Motion, noise: &Noise) -> RunnerUp {
+    let pose = poses.score(motion, poses.threshold());
+    let size = length(poses.observations, &motion, &pose.inliers, noise);
+    RunnerUp {
+        pose: with_length(&motion, size),
+        score: share(&pose.scored, poses.observations),
+        inlier_count: pose.inliers.len(),
+    }
+}
