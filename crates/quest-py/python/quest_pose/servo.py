@@ -13,5 +13,8 @@ Frame 1 is the goal, frame 2 the camera now. Give the features of the goal image
 """
 
 from quest_pose._core import CameraServo, Command, RobotServo
+from quest_pose._servo_goal import GoalImage
+from quest_pose._servo_loop import Servo
+from quest_pose._servo_recorder import Recorder
 
-__all__ = ["CameraServo", "Command", "RobotServo"]
+__all__ = ["CameraServo", "Command", "GoalImage", "Recorder", "RobotServo", "Servo"]
