@@ -6,6 +6,8 @@
     reason = "helpers of tests: what they expect failing is the test failing"
 )]
 
+pub mod hostile;
+pub mod invariants;
 pub mod literal_quest;
 pub mod pairs;
 pub mod polynomial;
