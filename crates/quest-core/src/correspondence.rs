@@ -5,6 +5,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::camera::MAX_IMAGE_COORDINATE;
 use crate::{Camera, CameraError, Degeneracy};
 
+/// The lengths of bearings that are accepted. The largest product in the crate is that of the six lengths of a row of the
+/// constraint matrix: between these bounds it is a normal number, and so is every product of two lengths and a squared angle.
+const BEARING_LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
 /// One match: the viewing rays of the same point in camera 1 and in camera 2.
 ///
 /// The rays are kept as unit bearings together with the lengths of the vectors they were given as, so that
@@ -40,8 +44,12 @@ pub enum MatchError {
         /// What was found.
         value: f64,
     },
-    /// A bearing has no direction: its length is zero, or too small or large to be squared.
-    #[error("a bearing in view {view} has the length {length:e}, expected between 1e-150 and 1e150")]
+    /// A bearing has no direction: its length is zero, or so small or large that products of lengths are not numbers.
+    #[error(
+        "a bearing in view {view} has the length {length:e}, expected between {:e} and {:e}",
+        BEARING_LENGTHS.start(),
+        BEARING_LENGTHS.end()
+    )]
     NoDirection {
         /// 1 or 2.
         view: u8,
@@ -182,8 +190,7 @@ fn unit(view: u8, x: [f64; 3]) -> Result<(Vector3<f64>, f64), MatchError> {
     }
     let x = Vector3::from(x);
     let largest = x.amax();
-    // Between these bounds the squared length neither overflows nor underflows.
-    if !(1e-150..=1e150).contains(&largest) {
+    if !BEARING_LENGTHS.contains(&largest) {
         return Err(MatchError::NoDirection { view, length: largest });
     }
     let length = x.norm();
