@@ -20,12 +20,16 @@ pub fn pose(pose: &RelativePose) {
     assert!((r_21 * r_21.transpose() - nalgebra::Matrix3::identity()).amax() < UNIT);
 }
 
-/// Candidates are poses, best first, within the capacity, each with a residual in `[0, π/2]`.
+/// Candidates are poses, best first, within the capacity, each with a residual of at most π/√2, the largest without a translation.
 pub fn candidates(found: &Candidates, matches: &[Correspondence]) {
     assert!(found.len() <= Candidates::CAPACITY);
     for candidate in found.iter() {
         pose(&candidate.pose);
-        assert!((0.0..=PI / 2.0).contains(&candidate.residual), "residual {}", candidate.residual);
+        assert!(
+            (0.0..=PI / 2.0_f64.sqrt() + UNIT).contains(&candidate.residual),
+            "residual {}",
+            candidate.residual
+        );
         assert!(candidate.in_front <= matches.len());
         for m in matches {
             let depths = candidate.depths(m);
