@@ -119,6 +119,8 @@ pub mod disambiguation;
 mod epipolar_frame;
 pub mod feasibility;
 pub mod lanes;
+#[cfg(feature = "faer")]
+pub mod polynomial_system;
 pub mod pose;
 pub mod quaternion;
 pub mod robust;
