@@ -74,10 +74,11 @@
 //! with them to 1e-12.
 //!
 //! # Features
-//! None changes a result.
+//! `faer` is on by default; none changes a result.
 //!
 //! | feature | what it adds |
 //! |---|---|
+//! | `faer` | `polynomial_system`: every solution of a system of polynomials, by section 4.2 of the paper |
 //! | `rayon` | [`robust::estimate_batch`] on all cores |
 //! | `serde` | poses, candidates, cameras, estimates and [`robust::Options`] to and from serialised data, in the words of the tool's files |
 //! | `mint` | nalgebra's conversions between its types, those of this crate's interface, and `mint`'s, which other mathematics crates share |
@@ -90,6 +91,7 @@
 //! | section | what | module |
 //! |---|---|---|
 //! | 4.1 | quaternions and rotations | [`pose`] |
+//! | 4.2 | systems of polynomials by relinearisation | `polynomial_system` |
 //! | 5 | the problem, in quaternions | [`correspondence`], [`pose`], [`quaternion`] |
 //! | 6 | quartic constraints on the rotation | [`quaternion::constraint_matrix`] |
 //! | 7.1 | rotations as eigenvalues | [`solver::quest_eigen`] |

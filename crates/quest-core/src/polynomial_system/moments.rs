@@ -95,7 +95,9 @@ pub(super) fn multiples(system: &System, grading: Grading, table: &Table, degree
             };
             let mut row: Vec<_> = f.terms().filter_map(entry).collect();
             let norm = row.iter().map(|(_, c)| c * c).sum::<f64>().sqrt();
-            row.iter_mut().for_each(|(_, c)| *c /= norm);
+            for (_, c) in &mut row {
+                *c /= norm;
+            }
             rows.push(row);
         }
     }

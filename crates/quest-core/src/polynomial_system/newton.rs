@@ -32,7 +32,7 @@ pub(super) fn polish(system: &System, start: Vec<c64>, homogeneous: bool) -> Res
         }
         let improved = system.residual(&next);
         // Not a number is no improvement either.
-        if !(improved < residual) {
+        if improved.is_nan() || improved >= residual {
             break;
         }
         x = next;
@@ -43,11 +43,13 @@ pub(super) fn polish(system: &System, start: Vec<c64>, homogeneous: bool) -> Res
 
 /// Scales to norm 1 with the largest component real and positive.
 pub(super) fn normalize(x: &mut [c64]) {
-    let norm = x.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+    let norm = x.iter().map(c64::norm_sqr).sum::<f64>().sqrt();
     let largest = x.iter().fold(c64::ZERO, |a, b| if b.norm() > a.norm() * (1.0 + 1e-9) { *b } else { a });
     if norm > 0.0 {
         let factor = largest.conj() / largest.norm() / norm;
-        x.iter_mut().for_each(|c| *c *= factor);
+        for c in x.iter_mut() {
+            *c *= factor;
+        }
     }
 }
 

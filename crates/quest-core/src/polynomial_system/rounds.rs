@@ -71,16 +71,15 @@ pub(super) fn outcome(
     }
     Ok(match whole {
         Err(w_0) => Outcome::NotToldApart { told_apart: w_0.rank, full_rank: false },
-        Ok(found) => match verified(&found.points, options) {
-            Some(all) => {
+        Ok(found) => {
+            if let Some(all) = verified(&found.points, options) {
                 let at_infinity = functionals.count() - found.points.len();
                 Outcome::Found { all, at_infinity, w_0: found.w_0 }
-            }
-            None => {
+            } else {
                 let told_apart = found.points.iter().filter(|p| p.residual < SOLVED).count();
                 Outcome::NotToldApart { told_apart, full_rank: true }
             }
-        },
+        }
     })
 }
 
@@ -134,7 +133,7 @@ fn candidates(
 
 /// The unknowns from the values of the generators; `None` at infinity.
 fn point(grading: Grading, coordinates: &[c64]) -> Option<Vec<c64>> {
-    let norm = coordinates.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+    let norm = coordinates.iter().map(c64::norm_sqr).sum::<f64>().sqrt();
     if grading.step == 0 {
         let mut x = coordinates.to_vec();
         normalize(&mut x);

@@ -36,7 +36,7 @@ pub(super) fn spectrum(
     let r = eigen.U();
     let coordinates = (0..count).map(|k| {
         let r: Vec<c64> = r.col(k).iter().copied().collect();
-        let square: f64 = r.iter().map(|c| c.norm_sqr()).sum();
+        let square: f64 = r.iter().map(c64::norm_sqr).sum();
         actions.iter().map(|a| rayleigh(a, &r) / square).collect()
     });
     Ok(Ok(Spectrum { coordinates: coordinates.collect(), w_0: w_0.decision }))
@@ -44,7 +44,7 @@ pub(super) fn spectrum(
 
 /// A combination of matrices with weights of the normal distribution.
 fn combination(matrices: &[Mat<f64>], rng: &mut ChaCha8Rng) -> Mat<f64> {
-    let (rows, columns) = matrices.first().map_or((0, 0), |m| m.shape());
+    let (rows, columns) = matrices.first().map_or((0, 0), Mat::shape);
     let mut sum = Mat::zeros(rows, columns);
     for matrix in matrices {
         let weight: f64 = StandardNormal.sample(rng);
