@@ -79,7 +79,7 @@ def test_without_pyarrow_it_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> 
 def test_what_later_commands_say_is_kept() -> None:
     recorder = Recorder()
     recorder.begin(GOAL)
-    said = {"covariance": np.eye(6), "inlier_mask": np.arange(6) < 4, "residual": 0.5, "arrived": True, "reason": "why"}
+    said = {"covariance": np.eye(6), "inlier_mask": np.arange(6) < 4, "residual": 0.5, "arrived": True, "advice": "why"}
     plain = {"linear": np.ones(3), "angular": np.zeros(3), "state": "tracking", "R": None, "t": None, "inliers": 4}
     recorder.add(GOAL, SimpleNamespace(**plain))
     recorder.add(GOAL, SimpleNamespace(**plain, **said))
@@ -87,7 +87,7 @@ def test_what_later_commands_say_is_kept() -> None:
     assert np.isnan(columns["covariance"][0]).all() and (columns["covariance"][1] == np.eye(6)).all()
     np.testing.assert_array_equal(columns["inlier_mask"].sum(axis=1), [0, 4])
     np.testing.assert_array_equal(columns["arrived"], [False, True])
-    assert columns["reason"].tolist() == ["", "why"]
+    assert columns["advice"].tolist() == ["", "why"]
     assert columns["stamp"].tolist() == [0.0, 1.0]
     assert "R" not in columns and "hypotheses" not in columns
 

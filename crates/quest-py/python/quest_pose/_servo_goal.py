@@ -105,7 +105,7 @@ class GoalImage:
         row[kept] = np.arange(len(kept))
         is_kept = row[place.ravel()] >= 0
         self._points = places[kept]
-        self._points.flags.writeable = False
+        self._points.setflags(write=False)
         self._place = row[place.ravel()][is_kept]
         self._is_binary = descriptors.dtype == np.uint8
         self._descriptors = features.comparable(descriptors[is_kept])
@@ -250,7 +250,7 @@ class GoalImage:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._points.flags.writeable = False
+        self._points.setflags(write=False)
         self._detect = features.detector(self._detector, self._most)
 
     def __repr__(self) -> str:

@@ -103,7 +103,9 @@ class Servo:
         """(N, 2): the features of the last image, as the controller got them."""
         return self._points
 
-    def step(self, seen: Seen, *, stamp: float | None = None, mask: ArrayLike | None = None) -> Command:
+    def step(
+        self, seen: Seen, *, stamp: float | None = None, now: float | None = None, mask: ArrayLike | None = None
+    ) -> Command:
         """The command for one image.
 
         Parameters
@@ -113,6 +115,8 @@ class Servo:
             what is not seen, OpenCV's (N, 1, 2), or a list with None.
         stamp : float, optional
             When the image was taken, in seconds.
+        now : float, optional
+            The present on the clock of the stamps: an image that is too old stops the loop.
         mask : array_like of bool, optional
             As for ``GoalImage.match``.
 
@@ -123,8 +127,8 @@ class Servo:
         """
         is_image = not isinstance(seen, (list, tuple)) and np.asarray(seen).dtype == np.uint8
         self._points = self._goal.match(seen, mask=mask) if is_image else rows_of(seen, len(self._goal))
-        with_stamp = {} if stamp is None else {"stamp": stamp}
-        command = self._controller.step(self._points, **with_stamp)
+        times = {name: time for name, time in (("stamp", stamp), ("now", now)) if time is not None}
+        command = self._controller.step(self._points, **times)
         if self._recorder is not None:
             self._recorder.add(self._points, command, stamp=stamp)
         return command

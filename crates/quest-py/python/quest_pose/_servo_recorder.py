@@ -32,9 +32,11 @@ NUMBERS: dict[str, tuple[int, ...]] = {
     "seen": (),
     "inliers": (),
     "hypotheses": (),
+    "holding_seconds": (),
+    "restarts": (),
 }
-FLAGS = ("arrived",)
-WORDS = ("state", "reason")
+FLAGS = ("arrived", "border_limits")
+WORDS = ("state", "advice")
 ALWAYS = ("stamp", "points", "linear", "angular", "state")
 
 

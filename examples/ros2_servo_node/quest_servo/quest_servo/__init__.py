@@ -1,0 +1,1 @@
+"""Visual servoing from a goal image, for ROS 2."""
