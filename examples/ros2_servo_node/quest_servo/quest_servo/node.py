@@ -125,7 +125,7 @@ class ServoNode(Node):
         if arm or self.pilot.settings.stamped:
             message = TwistStamped()
             message.header.stamp = self.get_clock().now().to_msg()
-            message.header.frame_id = self._frame if arm else "base_link"
+            message.header.frame_id = self.pilot.settings.command_frame or (self._frame if arm else "base_link")
             fill(message.twist, answer.linear, answer.angular)
         else:
             message = fill(Twist(), answer.linear, answer.angular)

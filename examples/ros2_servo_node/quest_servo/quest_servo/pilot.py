@@ -12,6 +12,22 @@ from . import messages
 ZEROS_AT_THE_END = 5
 
 
+# x, y, z in metres and the quaternion x, y, z, w, as TF has them.
+NO_OFFSET = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def transform(numbers):
+    """The matrix of x, y, z, qx, qy, qz, qw. Raises ValueError for others."""
+    if len(numbers) != 7 or not abs(np.linalg.norm(numbers[3:]) - 1) < 1e-3:
+        raise ValueError(f"camera_in_hand is {list(numbers)}, expected x, y, z and a unit quaternion x, y, z, w")
+    q = np.array(numbers[3:]) / np.linalg.norm(numbers[3:])
+    cross = np.array([[0, -q[2], q[1]], [q[2], 0, -q[0]], [-q[1], q[0], 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += 2 * q[3] * cross + 2 * cross @ cross
+    matrix[:3, 3] = numbers[:3]
+    return matrix
+
+
 @dataclass
 class Settings:
     """The node's parameters; the units are those of the files in config."""
@@ -31,6 +47,8 @@ class Settings:
     tolerance: float = 0.01
     angle_tolerance: float = 0.5
     camera_in_base: list = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    camera_in_hand: list = field(default_factory=lambda: list(NO_OFFSET))
+    command_frame: str = ""
     stale_after: float = 0.25
     give_up_after: float = 60.0
     debug_image: bool = False
@@ -42,6 +60,7 @@ class Settings:
         for name in ("max_speed", "max_turn_rate", "rate", "unit", "period", "tolerance", "angle_tolerance", "stale_after", "give_up_after"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ValueError(f"{name} is {getattr(self, name)}, expected a positive number")
+        transform(self.camera_in_hand)
         return self
 
     def controller(self):
@@ -53,6 +72,8 @@ class Settings:
         options |= {name: getattr(self, name) for name in limits if getattr(self, name) > 0}
         options["largest_gap"] = self.stale_after
         if self.drive == "twist":
+            if tuple(self.camera_in_hand) != NO_OFFSET:
+                options["camera_in_hand"] = transform(self.camera_in_hand)
             return CameraServo, options | {"rate": self.rate}
         return RobotServo, options | {"camera_in_base": tuple(self.camera_in_base)}
 
