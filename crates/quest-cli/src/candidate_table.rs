@@ -7,8 +7,8 @@ use quest_io::{CandidateRecord, SolveRecord};
 
 use crate::table::{self, angle_axis, decimals, right, short, vector};
 
-/// The candidates, best first, a line each; on a terminal that is too narrow for that, three lines each. With a
-/// focal length residuals are given in pixels too.
+/// The candidates, best first, one line each, or three lines each on a narrow terminal. With a focal length, residuals are
+/// also given in pixels.
 pub(crate) fn text(record: &SolveRecord, focal_length: Option<f64>) -> String {
     let table = wide(record, focal_length);
     let width = table.lines().map(|line| line.trim_end().chars().count()).max().unwrap_or(0);
@@ -17,7 +17,7 @@ pub(crate) fn text(record: &SolveRecord, focal_length: Option<f64>) -> String {
     if is_wide { table.trim_fmt() } else { narrow(record, focal_length).trim_fmt() }
 }
 
-/// What both tables show of a candidate.
+/// The cells of a candidate that both tables show.
 struct Shown {
     angle: String,
     axis: [String; 3],
@@ -90,7 +90,7 @@ fn wide(record: &SolveRecord, focal_length: Option<f64>) -> Table {
     table
 }
 
-/// Vectors stand upright, and what belongs together shares a cell.
+/// Vectors are written as columns, and related numbers share a cell.
 fn narrow(record: &SolveRecord, focal_length: Option<f64>) -> Table {
     let mut table = table::empty([
         "#",

@@ -17,15 +17,15 @@ use crate::{
 /// Where the matches come from.
 #[derive(Args, Debug)]
 pub(crate) struct InputOptions {
-    /// The matches: .json, .jsonl or .csv; `-` is standard input.
+    /// The file of matches: .json, .jsonl or .csv; `-` is standard input.
     file: PathBuf,
-    /// The camera of view 1, and of view 2 where it has none of its own. Takes the place of the file's.
+    /// The camera of view 1, and of view 2 if `--camera2` is absent. It replaces the cameras of the file.
     #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
     camera1: Option<Camera>,
-    /// The camera of view 2. Takes the place of the file's.
+    /// The camera of view 2. It replaces the camera of the file.
     #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
     camera2: Option<Camera>,
-    /// The form of the input [default: after its extension, else after its beginning].
+    /// The format of the input [default: by the extension, else by the first characters].
     #[arg(long, value_enum, hide_default_value = true)]
     input_format: Option<InputFormat>,
 }
@@ -35,7 +35,7 @@ pub(crate) struct Input<'a> {
     options: &'a InputOptions,
     pairs: Pairs,
     quiet: bool,
-    /// Unknown keys that have been named.
+    /// Unknown keys that were already reported.
     told: HashSet<String>,
 }
 
@@ -71,7 +71,7 @@ impl Input<'_> {
         self.pairs.format() == quest_io::Format::JsonLines
     }
 
-    /// The next pair, its unknown keys named.
+    /// The next pair. Its unknown keys are reported.
     pub(crate) fn next(&mut self) -> Result<Option<Pair>, ReadError> {
         let Some(pair) = self.pairs.next() else { return Ok(None) };
         let mut pair = pair?;

@@ -20,7 +20,7 @@ pub(crate) fn write_csv<T: Serialize>(writer: &mut dyn Write, records: &[T]) -> 
     csv.flush()
 }
 
-/// The error of the target itself, by whose kind a closed pipe is told from a full disk.
+/// The error of the target itself. Its kind distinguishes a closed pipe from a full disk.
 fn plain(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
@@ -28,7 +28,7 @@ fn plain(error: csv::Error) -> io::Error {
     }
 }
 
-/// The columns of [`write_candidates`]. The depths, which differ in number, are left to JSON.
+/// The columns of [`write_candidates`]. Only JSON has the depths, because their number varies.
 const COLUMNS: [&str; 18] = [
     "pair",
     "name",
@@ -50,8 +50,8 @@ const COLUMNS: [&str; 18] = [
     "translation_error_deg",
 ];
 
-/// One row of CSV for each candidate of the pair with number `pair`, counted from one; the first pair brings
-/// the header.
+/// One row of CSV for each candidate of the pair with number `pair`, counted from one. The header comes before the rows of the
+/// first pair.
 pub(crate) fn write_candidates(writer: &mut dyn Write, pair: usize, record: &SolveRecord) -> io::Result<()> {
     let rows = record.candidates.iter().enumerate().map(|(i, candidate)| row(pair, i + 1, record, candidate));
     write_rows(writer, header(pair, COLUMNS).into_iter().chain(rows.map(Vec::from)))
@@ -97,7 +97,7 @@ fn row(pair: usize, number: usize, record: &SolveRecord, c: &CandidateRecord) ->
     ]
 }
 
-/// The columns of [`write_estimate`]. Inliers and covariance are left to JSON.
+/// The columns of [`write_estimate`]. Only JSON has the inliers and the covariance.
 const ESTIMATE_COLUMNS: [&str; 18] = [
     "pair",
     "name",
@@ -119,8 +119,8 @@ const ESTIMATE_COLUMNS: [&str; 18] = [
     "translation_error_deg",
 ];
 
-/// One row of CSV for the estimate of the pair with number `pair`, counted from one, its fields empty where there is no
-/// pose; the first pair brings the header.
+/// One row of CSV for the estimate of the pair with number `pair`, counted from one. Fields are empty if there is no pose. The
+/// header comes before the row of the first pair.
 pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &EstimateRecord) -> io::Result<()> {
     let mut row = vec![
         pair.to_string(),
@@ -143,7 +143,7 @@ pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &Estim
     write_rows(writer, header(pair, ESTIMATE_COLUMNS).into_iter().chain([row]))
 }
 
-/// All digits, with an exponent where it is shorter; nothing for what is not a number.
+/// All digits, with an exponent if that is shorter. The text is empty for NaN and infinity.
 pub(crate) fn text(x: f64) -> String {
     if x.is_finite() { format!("{x:?}") } else { String::new() }
 }

@@ -37,10 +37,10 @@ Files:
 
 Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
-  The format is that of --format, else of the extension of -o, else JSON Lines for JSON
-  Lines, else a table, on a terminal and in a pipe alike.
-  Results of JSON Lines are written one by one up to the first line that is bad; into a
-  file (-o) and as one JSON value (--format json) nothing is written then.
+  --format chooses the format. Without it the extension of -o does; without both, the
+  results of JSON Lines are JSON Lines, and others are a table.
+  Results of JSON Lines are written one by one up to the first bad line. With -o or with
+  --format json nothing is written if a line is bad.
 
 Exit status:
   0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
@@ -55,11 +55,11 @@ pub(crate) struct Arguments {
     /// The solver; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
-    /// Which candidates are computed: the real solutions alone (exact), also real parts of complex ones and the rotation
-    /// alone (all), also the motions of a plane if one explains the matches (planar).
+    /// Which candidates to compute. `exact`: real solutions only. `all`: also the real parts of complex solutions, and the
+    /// rotation alone. `planar`: as `all`, with the motions of a plane if a plane explains the matches.
     #[arg(long, value_name = "KINDS", default_value = Kinds::default().name(), value_parser = kinds_parser())]
     kinds: Kinds,
-    /// List also the candidates that have points behind a camera.
+    /// Also list the candidates that have points behind a camera.
     #[arg(long)]
     all: bool,
     #[command(flatten)]
@@ -124,7 +124,7 @@ pub(crate) fn enough_matches(pair: &Pair, solver: SolverName) -> Result<Vec<Corr
     Ok(matches)
 }
 
-/// Says why there is nothing to be shown of what a solver found.
+/// Says why no candidate of a solver is shown.
 pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
     let why = match (found.iter().map(|c| c.in_front).max(), found.degeneracy()) {
         (Some(most), _) => format!(

@@ -17,9 +17,10 @@ use crate::{
 };
 
 const EXAMPLES: &str = "\
-The time is that of one solve on this machine: the real solutions as poses, with scale and rank, the
-shortest of many measurements. The scenes are 100 realistic ones (coplanar for homography) with 0.75 px
-of noise and as few matches as the solver needs. It varies with what else the machine does.
+The time is that of one solve on this machine, the shortest of many measurements. A solve computes the
+real solutions as poses, with their scale and rank. The 100 scenes are realistic (coplanar for
+homography), with 0.75 px of noise and as few matches as the solver needs. Other load on the machine
+makes the time longer.
 
 Examples:
   quest-cli solvers
@@ -30,7 +31,7 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Measure nothing, and leave the times out.
+    /// Do not measure, and leave out the times.
     #[arg(long)]
     no_times: bool,
     #[command(flatten)]
@@ -74,7 +75,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 /// Scenes of a measurement.
 const SCENES: u64 = 100;
 
-/// Scenes that are timed together: long against the clock's own time, short against what the machine gives to others.
+/// How many scenes are timed together. A group takes long compared with reading the clock, and is short compared with the time
+/// slices of other programs.
 const GROUP: usize = 5;
 
 const SEED: u64 = 2018;
@@ -82,10 +84,10 @@ const SEED: u64 = 2018;
 /// How long one solver is measured.
 const MEASURED: Duration = Duration::from_millis(40);
 
-/// Microseconds a solve, to the nanosecond, of the real solutions alone, which every solver has.
+/// Microseconds of one solve, to the nanosecond, for the real solutions alone, which every solver has.
 ///
-/// What disturbs a measurement only makes it longer: of each group of scenes the shortest of many counts. Nothing of the first
-/// round does, it fills the caches.
+/// A disturbance can only make a measurement longer, so the shortest of many counts for each group of scenes. The first round
+/// does not count, because it fills the caches.
 fn time_us(solver: SolverName) -> Result<f64, SceneError> {
     let layout = if solver == SolverName::Homography { Layout::Coplanar } else { Layout::General };
     let points = solver.info().min_matches;

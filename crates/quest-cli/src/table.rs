@@ -30,7 +30,7 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
-/// As many decimals as show four digits of a length.
+/// The number of decimals that shows four digits of a length.
 pub(crate) fn decimals(length: f64) -> usize {
     if length == 0.0 {
         return 3;
@@ -38,7 +38,7 @@ pub(crate) fn decimals(length: f64) -> usize {
     (3..9).zip(3..).find(|&(n, _)| length * 10_f64.powi(n) >= 1000.0).map_or(9, |(_, n)| n)
 }
 
-/// Components with so many decimals, of one width.
+/// Components with this many decimals, all of the same width.
 pub(crate) fn vector(v: [f64; 3], decimals: usize) -> [String; 3] {
     let width = decimals + 3;
     v.map(|x| {

@@ -1,16 +1,16 @@
-//! What is said on standard error.
+//! Messages on standard error.
 
 use std::io::{self, Write};
 
-/// Longer lines are cut: a message may quote what it found in a file.
+/// The longest line; longer ones are cut, because a message may quote a file.
 const LONGEST: usize = 400;
 
-/// Writes `kind: text` as one line. Standard error that is closed or full is no reason to fail.
+/// Writes `kind: text` as one line. If standard error is closed or full, nothing fails.
 pub(crate) fn say(kind: &str, text: &str) {
     let _ = writeln!(io::stderr().lock(), "{kind}: {}", one_line(text));
 }
 
-/// The text on one line of bounded length, control characters made visible.
+/// The text on one line of bounded length, with visible control characters.
 pub(crate) fn one_line(text: &str) -> String {
     let mut line = String::new();
     for c in text.chars() {

@@ -12,10 +12,10 @@ use crate::{
 
 /// The result of one pair.
 pub(crate) trait Record: Serialize {
-    /// What stands under the heading; nothing where there is no answer.
+    /// The text under the heading; empty if there is no answer.
     fn table(&self, focal_length: Option<f64>) -> Option<String>;
 
-    /// The rows of the pair with this number, counted from one; the first one brings the header.
+    /// The rows of the pair with this number, counted from one. The first pair also has the header.
     fn write_csv(&self, writer: &mut dyn Write, pair: usize) -> io::Result<()>;
 }
 

@@ -8,19 +8,19 @@ use crate::quaternion::{bilinear, from_wxyz};
 
 /// The rotation `R_21` that maximises `Σ b · R a` over the unit bearings `a` in view 1 and `b` in view 2.
 ///
-/// For a unit quaternion `b · R a = −qᵀ M q`, so it is the eigenvector of `Σ M` with the smallest eigenvalue
-/// (Davenport's q-method, 1968). Exact for pure rotations, by any angle; where several rotations align the
-/// bearings equally well (all of them parallel) it is one of these.
+/// For a unit quaternion `b · R a = −qᵀ M q`, so the best one is the eigenvector of `Σ M` with the smallest eigenvalue
+/// (Davenport's q-method, 1968). The result is exact for pure rotations by any angle. If all bearings are parallel, several
+/// rotations align them equally well, and the result is one of these.
 #[must_use]
 pub fn best_rotation(matches: &[Correspondence]) -> UnitQuaternion<f64> {
     align(matches, |_| 1.0)
 }
 
-/// The rotation that best aligns the bearings as lines, where that may differ from [`best_rotation`]: the bearings of points
-/// behind a camera are opposite if their image points were taken as if in front. `None` for ordinary matches.
+/// The rotation that best aligns the bearings as lines, for matches where that may differ from [`best_rotation`]. A bearing is
+/// reversed if its point lies behind a camera and its image point was taken as if in front. `None` for ordinary matches.
 ///
-/// A rotation preserves the angles between bearings, so that those to the first one tell all signs but a common one, and
-/// it preserves orientation: with the signs right, `Σ b aᵀ` is near `R Σ a aᵀ`, of positive determinant.
+/// A rotation preserves the angles between bearings, so the angles to the first bearing give all signs up to a common one. It
+/// also preserves orientation: with the right signs, `Σ b aᵀ` is near `R Σ a aᵀ` and has a positive determinant.
 ///
 /// `sum` is the [`outer_sum`].
 pub(crate) fn best_rotation_of_lines(
@@ -59,8 +59,8 @@ pub(crate) fn rotation_of_outer_sum(sum: &Matrix3<f64>, count: usize) -> UnitQua
     }
 }
 
-/// One Gauss–Newton step on `Σ |b − R a|²`. The eigenvector squares the condition of the problem, which shows where the
-/// bearings nearly lie in a line; the residuals do not.
+/// One Gauss–Newton step on `Σ |b − R a|²`. The eigenvector squares the condition of the problem, which costs digits if the
+/// bearings nearly lie in a line. The residuals do not square it.
 fn polished(
     q_21: UnitQuaternion<f64>,
     matches: &[Correspondence],

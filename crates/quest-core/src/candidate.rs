@@ -16,8 +16,8 @@ pub enum CandidateKind {
     FromComplex,
     /// The rotation that best aligns the bearings, as if there were no translation.
     RotationOnly,
-    /// A motion of the plane that best explains the matches. Where the points do lie on one, it makes use of all of the
-    /// matches, and under noise comes closer to the truth than what fits five of them exactly.
+    /// A motion of the plane that best explains the matches. If the points do lie on a plane, this motion uses all of the
+    /// matches, and under noise it is closer to the truth than a pose that fits five of them exactly.
     Planar,
 }
 
@@ -39,15 +39,15 @@ impl CandidateKind {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Degeneracy {
-    /// Fewer matches than the solver needs.
+    /// There are fewer matches than the solver needs.
     TooFewMatches,
     /// All points coincide in one view.
     Coincident,
-    /// Matches are repeated, and too few distinct ones are left.
+    /// Some matches are repeated, and too few distinct ones are left.
     Duplicate,
     /// All points, or all but one, lie on a line.
     Collinear,
-    /// The matches give fewer independent constraints than the solver needs, for another reason than those above.
+    /// The matches give fewer independent constraints than the solver needs, and none of the reasons above applies.
     RankDeficient,
     /// A rotation alone explains the matches to the last digit: there is no translation, and no depth is
     /// determined. The candidate holds the rotation and `t = 0`.
@@ -112,10 +112,10 @@ impl Candidate {
 /// The candidates of one solve, best first: most points in front, then the smallest residual, then the smallest
 /// rotation.
 ///
-/// Residuals below 1e-12 rad count as equal: between exact solutions they are rounding, which must not decide the
-/// order. The smaller rotation is a matter of the order alone, not a sign of the true pose.
+/// Residuals below 1e-12 rad count as equal: they are rounding, which must not decide the order of exact solutions. A smaller
+/// rotation only makes the order definite; it does not make a pose more likely.
 ///
-/// Holds at most [`Candidates::CAPACITY`] and never allocates. Dereferences to a slice.
+/// The list holds at most [`Candidates::CAPACITY`] candidates and never allocates. It dereferences to a slice.
 #[derive(Clone, Debug)]
 pub struct Candidates {
     items: [Candidate; Self::CAPACITY],

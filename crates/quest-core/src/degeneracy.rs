@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use crate::{Correspondence, Degeneracy};
 
-/// Bearings closer than this are taken for the same one. Matches this close leave less than six digits
-/// of a constraint in double precision.
+/// Bearings closer than this count as the same one. A constraint of two matches this close has fewer than six correct digits in
+/// double precision.
 const SAME: f64 = 1e-10;
 
 /// Whether the bearings of camera 1 are parallel, in the same direction or the opposite one: a whole circle of rotations
@@ -14,8 +14,8 @@ pub(crate) fn all_parallel(matches: &[Correspondence]) -> bool {
     matches.iter().all(|m| m.bearing1().cross(matches[0].bearing1()).norm() < SAME)
 }
 
-/// Names the reason why matches give fewer than five independent constraints. Quadratic in their number; called only
-/// when the constraints have been found short.
+/// Names the reason why matches give fewer than five independent constraints. The time is quadratic in the number of matches;
+/// callers first find that constraints are missing.
 pub(crate) fn diagnose(matches: &[Correspondence]) -> Degeneracy {
     diagnose_fewer_than(5, matches)
 }
@@ -52,8 +52,8 @@ fn on_a_line<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> bool {
     nearest_lines(matches).iter().all(|line| line.square_distance < 1e-14)
 }
 
-/// Whether all points, or all but one, lie on a line in both images up to these mean distances, in radians: noise is then all
-/// that tells them from points that do.
+/// Whether all points, or all but one, lie on a line in both images up to these mean distances, in radians. Only noise then
+/// distinguishes them from points that lie on a line exactly.
 pub(crate) fn nearly_on_a_line(matches: &[Correspondence], distances: [f64; 2]) -> bool {
     let lines = nearest_lines(matches.iter());
     let off = |m: &Correspondence| {

@@ -1,18 +1,18 @@
 //! Which of several poses is the true one: a third view decides (section 10.1).
 //!
 //! Views 1 and 2 give candidates, and so do views 1 and 3, for the same points of view 1. The depths of these points in view 1 do
-//! not depend on where the other view is: of the true pair of candidates they agree up to one common scale, of a wrong one
-//! they do not. The paper compares the scaled depths themselves; here it is inverse depths, each with the weight that its noise
-//! leaves it, and a limit on what a false match may count.
+//! not depend on where the other view is. The true pair of candidates gives the same depths up to one common scale; a wrong pair
+//! does not. The paper compares the scaled depths. This module compares inverse depths, weighted by their noise, and limits the
+//! influence of a false match.
 
 use nalgebra::Vector3;
 
 use crate::{Correspondence, InputError, RelativePose};
 
-/// What a match counts at most, in standard deviations of its noise, squared.
+/// The largest cost of one match, in standard deviations of its noise, squared.
 const CAP: f64 = 9.0;
 
-/// Matches whose ratio of inverse depths is tried as the common scale.
+/// How many matches propose their ratio of inverse depths as the common scale.
 const TRIALS: usize = 50;
 
 /// The noise that is assumed where none is known: a pixel at a focal length of a thousand, in radians.
@@ -27,8 +27,8 @@ pub struct Choice {
     pub pose_31: usize,
     /// How far the depths are apart: mean square over the matches in units of the noise, at most nine.
     pub disagreement: f64,
-    /// The same for the best pair with another pose from view 1 to view 2; infinite where there is none. Close to
-    /// [`disagreement`](Self::disagreement) the third view does not decide.
+    /// The same for the best pair with another pose from view 1 to view 2; infinite if there is none. The third view does not
+    /// decide if this is close to [`disagreement`](Self::disagreement).
     pub next_best: f64,
     /// The length of the translation to view 3 over that to view 2, in one common scale.
     pub ratio: f64,

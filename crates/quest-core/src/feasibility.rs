@@ -6,7 +6,7 @@ use crate::{Correspondence, RelativePose};
 
 /// How many matches have positive depth in both views: the exact test, and the default.
 ///
-/// A match whose rays are parallel to rounding has no depth; it counts where the rays point the same way.
+/// A match whose rays are parallel to rounding has no depth. It counts if the rays point the same way.
 #[must_use]
 pub fn in_front(pose: &RelativePose, matches: &[Correspondence]) -> usize {
     let positive = |m: &&Correspondence| match pose.depths(m) {

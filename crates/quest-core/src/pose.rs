@@ -60,7 +60,7 @@ impl RelativePose {
 
     /// The angle in radians of the rotation that takes this pose's rotation to `other`'s, in `[0, π]`.
     ///
-    /// Twice the metric (61) of the paper, and exact for small angles.
+    /// This is twice the metric (61) of the paper. It is exact for small angles.
     #[must_use]
     pub fn rotation_error(&self, other: &Self) -> f64 {
         let d = self.q_21.inverse() * other.q_21;
@@ -69,7 +69,7 @@ impl RelativePose {
 
     /// The angle in radians between the two translations, in `[0, π]`, or `None` where one of them vanishes.
     ///
-    /// Signed, unlike the metric (62) of the paper.
+    /// The sign of the translations matters, unlike in the metric (62) of the paper.
     #[must_use]
     pub fn translation_error(&self, other: &Self) -> Option<f64> {
         let (a, b) = (self.t_21.try_normalize(0.0)?, other.t_21.try_normalize(0.0)?);
@@ -85,8 +85,8 @@ impl RelativePose {
     /// The depths `(z1, z2)` of a match, in the unit of `t_21`: `z1 R x1 + t = z2 x2`, equation (28), in the
     /// least-squares sense where the two rays do not meet.
     ///
-    /// Depths multiply the vectors as they were given to [`Correspondence`]. `None` where no depth is determined:
-    /// the translation is zero, or the rays are parallel.
+    /// Depths multiply the vectors as they were given to [`Correspondence`]. `None` if no depth is determined, because
+    /// the translation is zero or the rays are parallel.
     #[must_use]
     pub fn depths(&self, m: &Correspondence) -> Option<(f64, f64)> {
         // Without a translation every depth fits, also where noise keeps the rays from being parallel.
@@ -108,7 +108,7 @@ impl RelativePose {
     /// The Sampson error of a match on the sphere, in radians: to first order, the root of the summed squares of
     /// the angles by which its two bearings have to turn to satisfy `x2ᵀ E x1 = 0`.
     ///
-    /// Where the translation is zero the bearings have to meet instead.
+    /// If the translation is zero, the bearings must coincide instead.
     #[must_use]
     pub fn sampson_error(&self, m: &Correspondence) -> f64 {
         let (b, c) = (m.bearing2(), self.q_21 * m.bearing1());

@@ -1,6 +1,6 @@
 //! How poses and cameras stand in serialised data (feature `serde`), in the words of the files of `quest-cli`.
 //!
-//! What comes in is checked as it is elsewhere: a camera by [`Camera::new`], a quaternion has to be finite and of length one.
+//! Input is checked here as everywhere: a camera by [`Camera::new`], and a quaternion must be finite and of length one.
 
 use nalgebra::{Matrix6, Quaternion, UnitQuaternion};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -91,7 +91,7 @@ pub(crate) mod rows {
     }
 }
 
-/// A number that may be infinite, which JSON has no word for: it is nothing there.
+/// A number that may be infinite. JSON has no word for infinity, so it is `null` there.
 pub(crate) mod or_infinite {
     use super::{Deserialize, Deserializer, Serialize, Serializer};
 

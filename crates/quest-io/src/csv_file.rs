@@ -49,11 +49,11 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     Ok(pair)
 }
 
-/// What is wrong in a row, with the column where it is in one.
+/// The error of a row, with its column if it concerns one.
 type Refusal = (Option<&'static str>, Fault);
 
-/// The line that a row stands on. The position of the csv crate is the end of the row before, which blank lines
-/// and one half of `\r\n` may follow.
+/// The line that a row stands on. The csv crate gives the end of the row before, which may be followed by blank lines
+/// and one half of `\r\n`.
 fn line(text: &str, row: &StringRecord) -> usize {
     let end = row.position().map_or(0, |p| usize::try_from(p.byte()).unwrap_or(usize::MAX));
     let text = text.as_bytes();
@@ -65,7 +65,7 @@ fn known(column: &str) -> bool {
     COLUMNS.contains(&column) || column == SCORE
 }
 
-/// Where the coordinates and the score stand; `None` where a coordinate is missing or a column appears twice.
+/// The columns of the coordinates and of the score; `None` if a coordinate is missing or a column appears twice.
 fn columns(header: &StringRecord) -> Option<([usize; 4], Option<usize>)> {
     let find = |name: &str| {
         let mut places = header.iter().enumerate().filter(|(_, column)| *column == name).map(|(k, _)| k);

@@ -4,7 +4,7 @@ use std::{fmt, io};
 
 use quest_core::{CameraError, InputError, MatchError};
 
-/// A place in a file, `file:line:column: key`, as far as it is known.
+/// A place in a file, `file:line:column: key`. Parts that are not known are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// The file as it was named.
@@ -60,7 +60,7 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {fault}")]
 pub struct ReadError {
-    /// Where.
+    /// The place of the error.
     pub place: Place,
     /// What was found, and what was expected.
     pub fault: Box<Fault>,
@@ -111,7 +111,7 @@ pub enum Fault {
     /// The width of an image is given without its height, or the reverse.
     #[error("found one of width and height, expected both or none")]
     HalfASize,
-    /// There is not one score a match.
+    /// The number of scores differs from the number of matches.
     #[error("found {found} scores, expected {expected}, one a match")]
     ScoreCount {
         /// Scores in the file.
@@ -130,7 +130,7 @@ pub enum Fault {
     Matches(#[from] InputError),
 }
 
-/// The system's words without the number that Rust appends.
+/// The message of the operating system, without the number that Rust appends.
 pub(crate) fn plain(error: &io::Error) -> String {
     let text = error.to_string();
     match text.rfind(" (os error ") {

@@ -38,7 +38,7 @@ struct CameraFile {
     params: Vec<f64>,
 }
 
-/// Exactly `N` numbers. The array of serde says of a longer list only that characters trail.
+/// Exactly `N` numbers. For a longer list, serde's own array reports only trailing characters.
 struct Numbers<const N: usize>([f64; N]);
 
 impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
@@ -72,7 +72,7 @@ impl<'de, const N: usize> Visitor<'de> for NumbersVisitor<N> {
     }
 }
 
-/// An object of the form `T`. A struct of serde takes a list of its values as well.
+/// An object of the form `T`. A plain serde struct would also accept a list of its values.
 struct Object<T>(T);
 
 impl<'de, T: DeserializeOwned> Deserialize<'de> for Object<T> {
@@ -95,7 +95,7 @@ impl<'de, T: DeserializeOwned> Visitor<'de> for ObjectVisitor<T> {
     }
 }
 
-/// The pair in `text`, which starts at `place`: at its line where it has one, else at line 1 of the file.
+/// The pair in `text`, which starts at the line of `place`, or at line 1 of the file if `place` has no line.
 pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
     let mut unknown_keys = Vec::new();
     let mut track = serde_path_to_error::Track::new();

@@ -8,13 +8,13 @@ use serde_json::{Serializer, ser::Formatter};
 /// Writes `value` as indented JSON that ends in a newline. Numbers that are not finite become `null`.
 ///
 /// # Errors
-/// What `writer` says.
+/// The error of `writer`.
 pub fn write_json<T: Serialize + ?Sized>(mut writer: &mut dyn io::Write, value: &T) -> io::Result<()> {
     value.serialize(&mut Serializer::with_formatter(&mut writer, Indented::default()))?;
     writer.write_all(b"\n")
 }
 
-/// Breaks lines in objects and in lists of objects, not in lists of numbers.
+/// Breaks lines in objects and in lists of objects, but not in lists of numbers.
 #[derive(Default)]
 struct Indented {
     /// How many objects are open.

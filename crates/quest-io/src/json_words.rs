@@ -1,4 +1,4 @@
-//! What `serde_json` says, in this crate's words.
+//! Errors of `serde_json`, in this crate's words.
 
 use serde_json::error::Category;
 
@@ -21,7 +21,7 @@ pub(crate) fn error(place: &Place, text: &str, path: &str, error: &serde_json::E
     here.error(Fault::Json(in_words(error.classify(), said, found)))
 }
 
-/// The parser's words in this crate's: what was found, what was expected.
+/// The parser's message in this crate's words: what was found, what was expected.
 fn in_words(category: Category, said: &str, found: &str) -> String {
     const PLAIN: [(&str, &str); 6] = [
         ("f64", "a number"),

@@ -11,8 +11,8 @@
 //! # Ok::<(), quest_io::ReadError>(())
 //! ```
 //!
-//! - [`read`] opens a file or standard input and yields [`Pair`]s; what is wrong with a file is a
-//!   [`ReadError`]: one line with the place, what was found and what was expected.
+//! - [`read`] opens a file or standard input and yields [`Pair`]s. A bad file is a [`ReadError`]: one line with the place, what
+//!   was found and what was expected.
 //! - [`SolveRecord`] and [`EstimateRecord`] are the results of a solve and of an estimate as they stand in files.
 //! - [`Output`] writes a file whole or not at all; [`write_json`] writes JSON for people.
 #![forbid(unsafe_code)]

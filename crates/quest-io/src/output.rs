@@ -16,12 +16,12 @@ use crate::error::plain;
 pub struct WriteError {
     /// The file as it was named, or `standard output`.
     pub target: String,
-    /// What the system says.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
 impl WriteError {
-    /// Whether the reader of a pipe has gone, as in `| head`: nobody is left to be told.
+    /// Whether the reader of a pipe has ended, as in `| head`. Nobody would read a message then.
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         self.source.kind() == io::ErrorKind::BrokenPipe
@@ -37,17 +37,17 @@ pub struct Output {
 
 #[derive(Debug)]
 enum Target {
-    /// Written as it comes.
+    /// Standard output, which is written at once.
     Stdout,
-    /// Devices, pipes and what else cannot be replaced.
+    /// A device, a pipe, or another file that cannot be replaced.
     Special(File),
-    /// Written beside the file under another name, then renamed.
+    /// A file that is written under another name in the same directory, then renamed.
     File { path: PathBuf, text: Vec<u8> },
 }
 
 impl Output {
-    /// Standard output for `None`, `-` and `/dev/stdout`, else the file at `path`, which is not touched yet;
-    /// that its directory can be written to is tried.
+    /// Standard output for `None`, `-` and `/dev/stdout`, else the file at `path`. The file is not touched yet, but its
+    /// directory is checked: it must be writable.
     ///
     /// # Errors
     /// A path that cannot be written to.
@@ -66,7 +66,7 @@ impl Output {
     /// Runs `write` on the target.
     ///
     /// # Errors
-    /// What the target says, with its name.
+    /// The error of the target, with its name.
     pub fn write(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
         let result = match &mut self.target {
             Target::Stdout => write(&mut io::stdout().lock()),
@@ -76,10 +76,10 @@ impl Output {
         result.map_err(|source| WriteError { target: self.name.clone(), source })
     }
 
-    /// Brings everything to its place. Without this call a file stays as it was.
+    /// Puts the result in its place. Without this call a file stays as it was.
     ///
     /// # Errors
-    /// What the target says, with its name. A file is then as it was before.
+    /// The error of the target, with its name. A file is then as it was before.
     pub fn finish(self) -> Result<(), WriteError> {
         let result = match self.target {
             Target::Stdout => io::stdout().flush(),
@@ -127,7 +127,7 @@ fn replace(path: &Path, text: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// A file with the permissions that a new file has, not the private ones of temporary files.
+/// A temporary file that has the permissions of an ordinary new file instead of private ones.
 fn new_file(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     builder.prefix(".quest-");

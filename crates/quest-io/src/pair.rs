@@ -1,4 +1,4 @@
-//! An image pair: cameras, matches, and what else a file tells of them.
+//! An image pair: cameras, matches, and the other data that a file has about them.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use quest_core::{Camera, Correspondence, InputError, RelativePose, correspondence};
@@ -14,7 +14,7 @@ pub struct Pair {
     pub cameras: Option<[Camera; 2]>,
     /// `u1, v1, u2, v2` of each match, finite.
     pub matches: Vec<[f64; 4]>,
-    /// One a match, higher is better.
+    /// One score for each match; higher is better.
     pub scores: Option<Vec<f64>>,
     /// The true pose.
     pub truth: Truth,

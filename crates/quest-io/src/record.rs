@@ -16,13 +16,13 @@ pub struct SolveRecord {
     pub solver: &'static str,
     /// How many matches were solved.
     pub matches: usize,
-    /// Why the matches do not determine a pose, or only a part of it: a name of [`quest_core::Degeneracy`].
+    /// Why the matches determine no pose, or only a part of one: a name of [`quest_core::Degeneracy`].
     pub degeneracy: Option<&'static str>,
     /// The poses that may be the true one.
     pub candidates: Vec<CandidateRecord>,
 }
 
-/// One candidate. Numbers that are not determined are `None`, in files `null`.
+/// One candidate. Numbers that are not determined are `None`, or `null` in files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateRecord {
     /// A name of [`quest_core::CandidateKind`].

@@ -10,7 +10,7 @@ pub enum Scale {
     /// By difference.
     #[default]
     Linear,
-    /// By ratio; what is not positive is not drawn.
+    /// By ratio. Values that are not positive are not drawn.
     Log,
 }
 
@@ -21,8 +21,8 @@ pub struct Axis {
     pub label: String,
     /// How values become lengths.
     pub scale: Scale,
-    /// The range; that of the data if there is none. A range from a larger to a smaller value runs backwards,
-    /// as the v axis of an image does.
+    /// The range; `None` takes the range of the data. A range from a larger to a smaller value runs backwards,
+    /// like the v axis of an image.
     pub range: Option<[f64; 2]>,
 }
 
@@ -76,7 +76,7 @@ impl Axis {
     }
 }
 
-/// An axis with its range as plotters wants it: values in, pixels out.
+/// An axis with its range, in the form that plotters needs: it maps values to pixels.
 #[derive(Clone, Debug)]
 pub(crate) struct Ruler {
     scale: Scale,
@@ -130,7 +130,7 @@ fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..=(last - first) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
-/// Powers of ten, every so many where there are too many of them; 1, 2, 5 within fewer than two decades.
+/// Powers of ten, with gaps if there would be too many of them. Within fewer than two decades 1, 2 and 5 times a power of ten.
 #[expect(clippy::cast_possible_truncation, reason = "exponents of f64")]
 fn log_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let [first, last] = [low, high].map(f64::log10);

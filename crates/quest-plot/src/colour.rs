@@ -19,7 +19,7 @@ pub const MUTED: Colour = Colour(0x6b, 0x72, 0x80);
 /// Lines of the grid.
 pub const GRID: Colour = Colour(0xe5, 0xe7, 0xeb);
 
-/// What has no colour of its own: Paul Tol's "muted" scheme.
+/// Colours for everything that has no colour of its own: Paul Tol's "muted" scheme.
 const PALETTE: [Colour; 9] = [
     Colour(0x33, 0x22, 0x88),
     Colour(0xcc, 0x66, 0x77),

@@ -1,4 +1,4 @@
-//! Labels that do not lie on each other.
+//! Labels that do not overlap.
 
 /// Moves heights apart until neighbours differ by at least `gap`, in their order, as little as possible and within
 /// `0..=height` where there is room.

@@ -7,7 +7,7 @@ use crate::{Figure, PlotError, Space, html};
 pub(crate) enum Item {
     Figure(Figure),
     Space(Space),
-    /// The caption, the header and the rows, of which the first column is aligned to the left.
+    /// The caption, the header and the rows. The first column is aligned to the left.
     Table(String, Vec<Vec<String>>),
 }
 
@@ -55,7 +55,7 @@ impl Page {
         self
     }
 
-    /// The page: about 5 MB, nearly all of it plotly.js, so that it works without a network.
+    /// The page. It has about 5 MB, nearly all of which is plotly.js, so it works without a network.
     ///
     /// # Errors
     /// [`PlotError::Json`] where the data cannot be written.

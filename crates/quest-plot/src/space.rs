@@ -2,7 +2,7 @@
 
 use crate::Colour;
 
-/// Parts in a common frame; a page shows it with one scale for all axes, to be turned and zoomed. There is no SVG of it.
+/// Parts in a common frame. A page shows them with one scale for all axes; the reader turns and zooms it. There is no SVG form.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Space {
     /// The title.
@@ -15,7 +15,7 @@ pub struct Space {
     pub parts: Vec<Part>,
     /// The direction that is up when the page is opened.
     pub up: [f64; 3],
-    /// From where the middle of the scene is seen then, in units of about its size.
+    /// The position from which the middle of the scene is seen at first, in units of about the size of the scene.
     pub eye: [f64; 3],
 }
 
@@ -32,7 +32,7 @@ impl Space {
         }
     }
 
-    /// As cameras have it: x to the right, y down, z forward; seen from above and beside camera 1, looking forward.
+    /// The frame of a camera: x to the right, y down, z forward. It is seen from above and beside camera 1, looking forward.
     #[must_use]
     pub fn of_camera(title: impl Into<String>) -> Self {
         Self { up: [0.0, -1.0, 0.0], eye: [-0.9, -0.8, -1.5], ..Self::new(title) }
@@ -55,7 +55,7 @@ pub struct Part {
     pub colour: Colour,
     /// Polylines: rays, paths, the frustum of a camera.
     pub lines: Vec<Vec<[f64; 3]>>,
-    /// Points, each with what is shown when the mouse is over it.
+    /// Points, each with the text that is shown when the mouse is over it.
     pub points: Vec<([f64; 3], String)>,
     /// Words in the scene.
     pub words: Vec<([f64; 3], String)>,

@@ -36,33 +36,34 @@ Figures:
   Errors are the paper's metrics in radians: half the angle of the rotation (61), and the angle
   between the translations whatever their signs (62).
 
-Readings, which compare like with like only within one of them:
-  exact     the candidate closest to the truth, of the real solutions
-  all       the same of all kinds, with real parts of complex solutions and the rotation alone
+Readings (compare solvers only within one of them):
+  exact     the real solution closest to the truth
+  all       the candidate of any kind closest to the truth: also real parts of complex
+            solutions, and the rotation alone
   selected  the candidate that 30 further points of the scene choose, without the truth
 
-The same seed gives the same numbers on any number of threads; the times of table 1 are
-measured, on one thread. ± is the 95 % confidence interval of the mean. \"ahead of\" counts the
-values at which the errors are smaller than those of the first solver at the same scenes: those
-at which the 95 % confidence interval of the mean difference is below zero.";
+The same seed gives the same numbers on any number of threads. The times of table 1 are
+measured on one thread. ± is the 95 % confidence interval of the mean. \"ahead of\" counts the
+values at which a solver has smaller errors than the first solver at the same scenes: the 95 %
+confidence interval of the mean difference is below zero.";
 
 /// The experiments of the paper's section 9: errors of the solvers on random scenes, and their times.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Only this figure of the paper; may be repeated.
+    /// Run only this figure of the paper. The option may be repeated.
     #[arg(long, value_name = "4..8", value_parser = parse_figure)]
     figure: Vec<Figure>,
-    /// Only this table of the paper.
+    /// Run only this table of the paper.
     #[arg(long, value_name = "1", value_parser = clap::value_parser!(u8).range(1..=1))]
     table: Option<u8>,
-    /// Scenes of each value of the noise or the parallax, and of the table [default: those of the paper].
+    /// Number of scenes for each value of the noise or the parallax, and for the table [default: as in the paper].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     trials: Option<u32>,
-    /// These solvers, separated by commas [default: all that need no more points].
+    /// The solvers to compare, separated by commas [default: all for which the points suffice].
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = solver_parser())]
     solvers: Vec<SolverName>,
-    /// Which candidates the readings `all` and `selected` are of.
+    /// Which candidates the readings `all` and `selected` choose from.
     #[arg(long, value_name = "all|planar", default_value = Kinds::default().name(), value_parser = kinds_parser())]
     kinds: Kinds,
     /// The seed of the scenes.
@@ -71,16 +72,16 @@ pub(crate) struct Arguments {
     /// How scenes are drawn.
     #[arg(long, value_enum, default_value_t = Scenes::Paper)]
     scenes: Scenes,
-    /// Points of a scene.
+    /// Number of points of a scene.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(5..=1000))]
     points: u16,
     /// Round pixels to whole numbers after the noise. Table 1 always does, as in the paper.
     #[arg(long)]
     rounded: bool,
-    /// Draw the figures into this file, by its extension as SVG or as a page that works offline.
+    /// Draw the figures into this file: .svg, or .html for a page that works offline.
     #[arg(long, value_name = "FILE.svg|html", value_parser = parse_plot)]
     plot: Option<Plot>,
-    /// Threads; 0 are as many as there are cores.
+    /// Number of threads; 0 takes as many as there are cores.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
     #[command(flatten)]

@@ -13,7 +13,7 @@ pub(crate) enum Quantity {
     RotationRad,
     /// (62), in radians.
     TranslationRad,
-    /// Of one solve, in milliseconds.
+    /// The time of one solve, in milliseconds.
     TimeMs,
 }
 
@@ -32,17 +32,17 @@ pub(crate) struct Record {
     /// `exact`, `all` or `selected`.
     pub(crate) reading: &'static str,
     pub(crate) quantity: Quantity,
-    /// Scenes; of times, rounds over all scenes.
+    /// The number of scenes; for times, the number of rounds over all scenes.
     pub(crate) trials: usize,
-    /// Scenes without a candidate, which the numbers leave out.
+    /// The number of scenes without a candidate. The other numbers leave them out.
     pub(crate) unanswered: usize,
     pub(crate) mean: Option<f64>,
     pub(crate) ci95: Option<f64>,
-    /// The mean of what the errors are more than those of the first solver at the same scenes.
+    /// The mean difference of the errors to those of the first solver at the same scenes.
     pub(crate) difference: Option<f64>,
     pub(crate) difference_ci95: Option<f64>,
     pub(crate) median: Option<f64>,
-    /// Of times, the fastest round: what the machine's other work disturbs least.
+    /// The fastest round, for times. Other work of the machine disturbs it least.
     pub(crate) smallest: Option<f64>,
     /// What the paper's table says.
     pub(crate) paper: Option<f64>,

@@ -14,9 +14,9 @@ use crate::{Failure, progress::Progress};
 pub(crate) struct Run {
     pub(crate) figures: Vec<Figure>,
     pub(crate) has_table: bool,
-    /// Scenes of a value; those of the paper if none are given.
+    /// The number of scenes of each value; the paper's if absent.
     pub(crate) trials: Option<u32>,
-    /// The solvers asked for; those of the paper's figure, and ours, if none are.
+    /// The requested solvers; without a request, those of the paper's figure and ours.
     pub(crate) solvers: Vec<SolverName>,
     /// Which candidates they return.
     pub(crate) kinds: Kinds,
@@ -37,7 +37,7 @@ impl Run {
         self.trials.unwrap_or(figure.trials())
     }
 
-    /// The solvers that a figure compares. Homographies are in those alone that have scenes for them.
+    /// The solvers that a figure compares. The homography takes part only in figures with coplanar scenes.
     pub(crate) fn solvers_of(&self, figure: Figure) -> Vec<SolverName> {
         if !self.solvers.is_empty() {
             return self.solvers.clone();
@@ -46,7 +46,7 @@ impl Run {
         self.all_solvers().into_iter().filter(|&s| for_planes || s != SolverName::Homography).collect()
     }
 
-    /// The solvers asked for, or all to which the points are enough.
+    /// The requested solvers, or all for which the points suffice.
     pub(crate) fn all_solvers(&self) -> Vec<SolverName> {
         if !self.solvers.is_empty() {
             return self.solvers.clone();

@@ -1,4 +1,4 @@
-//! What is said of many numbers.
+//! Statistics of many numbers.
 
 /// Mean, its confidence interval, and the median.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub(crate) struct Statistics {
 }
 
 impl Statistics {
-    /// Of these values, summed in their order; `None` where there are none.
+    /// The statistics of these values, summed in their order; `None` if there are none.
     pub(crate) fn of(values: &[f64]) -> Option<Self> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;

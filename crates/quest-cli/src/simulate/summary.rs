@@ -8,7 +8,7 @@ use crate::table;
 
 /// The columns of a table, as parts of the range.
 const SHOWN: [f64; 5] = [0.0, 0.1, 0.2, 0.5, 1.0];
-/// Errors that differ by less than this part of them, or lie below the rounding, count as equal.
+/// Errors count as equal if they differ by less than this fraction or lie below the rounding.
 const NEARLY: f64 = 1.02;
 const ROUNDING: f64 = 1e-9;
 

@@ -30,7 +30,7 @@ const PAPER: [(&str, usize, f64); 10] = [
 
 /// Scenes where no number is given: those of the paper.
 const SCENES: u32 = 1000;
-/// A row is timed for this long, and at least so often.
+/// The shortest time for which a row is measured, and the least number of its rounds.
 const BUDGET: Duration = Duration::from_millis(250);
 const ROUNDS: usize = 3;
 

@@ -19,10 +19,10 @@ Examples:
   quest-cli view examples/points.json -o view.html
   quest-cli view examples/tiny_berlin_7in.json --all -o view.html
 
-The page shows both cameras, rays, and points at their depths in the frame of camera 1, each
-candidate to be switched on and off, and the residuals. It is one file of 5 MB that works without
-a network. Files are those that `quest-cli solve` and `estimate` read, not their results, which have no
-matches; of JSON Lines the first pair is shown.
+The page shows both cameras, the rays, the points at their depths in the frame of camera 1, and the
+residuals. Each candidate can be switched on and off. The page is one file of 5 MB that works without
+a network. It reads the files that `quest-cli solve` and `estimate` read, but not their results,
+which have no matches. JSON Lines show their first pair.
 
 Exit status: 0 a page, 1 no pose could be found, 2 bad input or arguments.";
 
@@ -38,10 +38,10 @@ pub(crate) struct Arguments {
     /// The solver; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
-    /// Show also the candidates that have points behind a camera.
+    /// Also show the candidates that have points behind a camera.
     #[arg(long)]
     all: bool,
-    /// Say nothing on standard error but errors and why there is no pose.
+    /// Write only errors, and why there is no pose, to standard error.
     #[arg(long)]
     quiet: bool,
 }
@@ -53,7 +53,7 @@ struct Solved<'a> {
     /// Those that are shown, best first.
     candidates: Vec<Candidate>,
     record: SolveRecord,
-    /// The mean focal length in pixels; without cameras residuals are angles.
+    /// The mean focal length in pixels. Without cameras residuals are angles.
     focal_length: Option<f64>,
 }
 

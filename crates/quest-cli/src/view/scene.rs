@@ -6,7 +6,7 @@ use quest_plot::{Colour, Part, Space, colour};
 
 use super::{Solved, page};
 
-/// Points farther away than this are not drawn, only their rays: they would make everything else small.
+/// The largest distance of a drawn point. Farther points would make everything else small, so only their rays are drawn.
 const FARTHEST: f64 = 8.0;
 const CAMERA_1: &str = "camera 1";
 const TRUTH: &str = "true camera 2";
@@ -78,15 +78,15 @@ fn camera(name: &str, colour: Colour, pose: &RelativePose, corners: [[f64; 2]; 4
     Part { lines, words: vec![(beside, label.to_owned())], is_shown, ..Part::new(name, colour) }
 }
 
-/// Where the two rays of a match come closest, on the ray of camera 1, and on that of camera 2 in the frame of
-/// camera 1; `None` where nothing says how far that is.
+/// Where the two rays of a match come closest: the point on the ray of camera 1, and the point on the ray of camera 2, both in
+/// the frame of camera 1. `None` if no depth is determined.
 fn ends(pose: &RelativePose, m: &Correspondence) -> Option<[Vector3<f64>; 2]> {
     let (z1, z2) = pose.depths(m)?;
     let x2 = m.bearing2() * (z2 * m.length2());
     Some([m.bearing1() * (z1 * m.length1()), pose.q_21.inverse() * (x2 - pose.t_21)])
 }
 
-/// The rays from both centres to the points; where there is no point, or a far one, a piece of the ray.
+/// The rays from both centres to the points. A match without a point, or with a far one, gets a piece of the ray.
 fn rays(name: &str, colour: Colour, pose: &RelativePose, matches: &[Correspondence], is_shown: bool) -> Part {
     let centre2 = pose.inverse().t_21;
     let lines = matches.iter().flat_map(|m| {

@@ -7,9 +7,9 @@ use super::root::{COEFFICIENTS, Polynomial, positive_up_to};
 /// The map `D(x) = h(r²) x + 2 (w·x) x + r² w` with `r = |x|`, `h = N/D` a quotient of polynomials and the
 /// tangential vector `w = (p2, p1)`.
 ///
-/// It is the gradient of a potential (the tangential part that of `r² (w·x)`), so its Jacobian `J` is
-/// symmetric. On the disc `r <= max_radius` `J` is positive definite; the disc is convex, so `D` is the
-/// gradient of a strictly convex function there, and one to one.
+/// It is the gradient of a potential (the tangential part is the gradient of `r² (w·x)`), so its Jacobian `J` is
+/// symmetric. `J` is positive definite on the disc `r <= max_radius`. The disc is convex, so `D` is the gradient of a
+/// strictly convex function there, hence one to one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distortion {
     /// Coefficients of N in `r²`, the first one 1.
@@ -22,7 +22,7 @@ pub(super) struct Distortion {
 }
 
 impl Distortion {
-    /// The distortion with its domain, which reaches at most to the radius `limit`.
+    /// The distortion with its domain, whose radius is at most `limit`.
     pub(super) fn new(numerator: &[f64], denominator: &[f64], w: Vector2<f64>, limit: f64) -> Self {
         let mut this = Self {
             numerator: one_and(numerator),
@@ -41,8 +41,8 @@ impl Distortion {
     /// With `g(r) = r h(r²)`, `c` the cosine of the angle between x and w, and `t = |w| r`, the Jacobian in
     /// the radial and the tangential direction is `[g' + 6tc, 2ts; 2ts, h + 2tc]` with `s² = 1 - c²`. Its
     /// determinant is a convex quadratic in c; `g' > 6t` and `h > 4t` put the vertex below c = -1, so that
-    /// the least determinant over the circle is `(g' - 6t)(h - 2t) > 0`. The second condition follows from
-    /// the first where `h >= g'` (barrel distortion): there the disc is the largest possible.
+    /// the least determinant over the circle is `(g' - 6t)(h - 2t) > 0`. If `h >= g'` (barrel distortion), the second
+    /// condition follows from the first, and the disc is the largest possible.
     fn conditions(&self) -> [Polynomial; 3] {
         let [mut slope, mut ratio, mut denominator] = [[0.0; COEFFICIENTS]; 3];
         let w = self.w.norm();
@@ -127,8 +127,8 @@ impl Distortion {
         self.solve(y, y * scale(start, radius)).or_else(|| self.solve(y, Vector2::zeros()))
     }
 
-    /// Solves `g(r) = distorted` on `[0, max_radius]`, where g increases: Newton, and bisection whenever
-    /// Newton leaves the bracket or does not halve its step. Ends at a relative step below `tolerance`.
+    /// Solves `g(r) = distorted` on `[0, max_radius]`, where g increases, by Newton's method. Bisects whenever a Newton
+    /// step leaves the bracket or is not half as long as the last one. Ends at a relative step below `tolerance`.
     fn solve_radial(&self, distorted: f64, tolerance: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.max_radius);
         let mut r = distorted.min(high);
@@ -157,8 +157,7 @@ impl Distortion {
         r
     }
 
-    /// Solves `D(x) = y` by Newton's method from `x`, in the disc, each step shortened until the error
-    /// decreases.
+    /// Solves `D(x) = y` in the disc by Newton's method from `x`. Each step is shortened until the error decreases.
     fn solve(&self, y: &Vector2<f64>, mut x: Vector2<f64>) -> Option<Vector2<f64>> {
         let (value, mut jacobian) = self.distort(&x);
         let mut error = value - y;
@@ -183,7 +182,7 @@ impl Distortion {
     }
 }
 
-/// What to multiply a vector of length `old` by to make its length `new`; 1 for the zero vector.
+/// The factor that changes the length of a vector from `old` to `new`; 1 for the zero vector.
 pub(super) fn scale(new: f64, old: f64) -> f64 {
     if old > 0.0 { new / old } else { 1.0 }
 }

@@ -7,9 +7,8 @@
 //! u = fx xd + cx,   v = fy yd + cy          (the focal lengths and the principal point in pixels)
 //! ```
 //!
-//! where `(xd, yd)` are distorted coordinates in units of the focal length. Where the centre of the first
-//! pixel lies, at (0, 0) as in OpenCV or at (0.5, 0.5) as in COLMAP, is the user's choice: the pixels and the
-//! principal point only have to agree.
+//! where `(xd, yd)` are distorted coordinates in units of the focal length. The centre of the first pixel may lie at
+//! (0, 0) as in OpenCV or at (0.5, 0.5) as in COLMAP. The user chooses; the pixels and the principal point must agree.
 //!
 //! | model | parameters | distortion |
 //! |---|---|---|
@@ -34,10 +33,10 @@
 //! Brandt 2006): `(xd, yd) = θd (X, Y) / √(X² + Y²)`.
 //!
 //! # Domain
-//! Distortion polynomials fold: beyond some radius two rays meet in one pixel. A camera is used only where it
-//! is one to one and connected to the image centre: up to the first radius (angle) at which the distorted
-//! radius stops growing. With tangential distortion that is the largest disc about the optical axis on which
-//! a bound proves the map invertible. Beyond it [`Camera::bearing`] and [`Camera::project`] return errors
+//! Distortion polynomials fold: beyond some radius two rays meet in one pixel. A camera is used only where its map is
+//! one to one and connected to the image centre, which is up to the first radius (angle) at which the distorted
+//! radius stops growing. With tangential distortion it is used on the largest disc about the optical axis on which
+//! a bound proves that the map is invertible. Beyond it [`Camera::bearing`] and [`Camera::project`] return errors
 //! that name the radius and the limit. The plane `z = 1` ends at [`MAX_IMAGE_COORDINATE`].
 //!
 //! # Sources
@@ -62,11 +61,11 @@ pub use model::CameraModel;
 
 use distortion::{Distortion, scale};
 
-/// Radii on the plane `z = 1` beyond this are refused: the viewing ray can no longer be told from one at a
-/// right angle to the optical axis (`1 / sqrt(f64::EPSILON)`).
+/// The largest radius on the plane `z = 1`, `1 / sqrt(f64::EPSILON)`. A viewing ray beyond it cannot be distinguished from
+/// one at a right angle to the optical axis.
 pub const MAX_IMAGE_COORDINATE: f64 = 6.7e7;
 
-/// Parameters beyond this are refused, so that no product of them overflows.
+/// The largest parameter. It is so small that no product of parameters overflows.
 const MAX_PARAMETER: f64 = 1e30;
 
 /// The number of parameters of the largest model.
@@ -140,7 +139,7 @@ impl Camera {
         Self::new(CameraModel::Pinhole, &[k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)]])
     }
 
-    /// The camera with the size of its images in pixels, which no computation needs.
+    /// The camera with the size of its images in pixels. No computation needs the size.
     ///
     /// # Errors
     /// [`CameraError::EmptyImage`] where one of them is zero.

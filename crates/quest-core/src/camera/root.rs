@@ -9,8 +9,8 @@ pub(super) type Polynomial = [f64; COEFFICIENTS];
 /// A radius up to which `p` is positive: just short of its first root in `(0, limit]`, or `limit`.
 ///
 /// Expects `p(0) > 0`. Walks to the root in steps that cannot jump over it: with `p(a + h) = Σ c_k h^k`, the
-/// polynomial is positive as long as `c_0` outweighs the negative terms. The steps grow without bound where
-/// no root follows (no negative terms) and converge quadratically to a simple root.
+/// polynomial is positive as long as `c_0` outweighs the negative terms. If no root follows, there are no negative terms and
+/// the steps grow without bound. Steps to a simple root converge quadratically.
 pub(super) fn positive_up_to(p: &Polynomial, limit: f64) -> f64 {
     // A pair of complex roots close to the axis shortens the steps geometrically, then lets them grow again:
     // about 60 steps at the worst. Stopping early is safe, only too cautious.

@@ -4,7 +4,7 @@ use super::{Layout, Motion, PoseErrors, Scene, SceneError, SceneOptions, View, c
 use crate::solver::{Kinds, SolverName};
 use crate::{CandidateKind, Candidates, Correspondence, Degeneracy};
 
-/// Points beside those that are solved, by which the candidate of [`Reading::Selected`] is chosen.
+/// The number of further points that choose the candidate of [`Reading::Selected`].
 pub const FURTHER_POINTS: usize = 30;
 
 /// The figures of section 9 that compare solvers.
@@ -50,8 +50,8 @@ impl Figure {
         self == Self::Six
     }
 
-    /// The grid with the kind of scenes that the paper has, or other ones: `base` gives the angle, the view, the
-    /// number of points and the rounding; the layout, the motion and the noise are the figure's.
+    /// The grid of the figure. `base` gives the angle, the view, the number of points and the rounding of the scenes; the
+    /// figure gives the layout, the motion and the noise.
     #[must_use]
     pub fn cells(self, base: &SceneOptions) -> Vec<Cell> {
         (0..=100_u16).map(|step| self.cell(base, step)).collect()
@@ -86,7 +86,7 @@ pub struct Cell {
     pub x: f64,
     /// The kinds of scenes, which take turns.
     pub scenes: Vec<SceneOptions>,
-    /// The first of its 2³² indices of scenes, which it shares with no other cell of any figure.
+    /// The first of its 2³² indices of scenes. No other cell of any figure has the same indices.
     pub stream: u64,
 }
 
@@ -114,15 +114,15 @@ pub struct Problem {
     pub view: View,
 }
 
-/// Which of a solver's candidates is judged. Comparisons hold within one reading alone: a solver that keeps the real
-/// parts of complex solutions has more candidates to be near the truth with than one that drops them.
+/// Which of a solver's candidates is judged. Compare solvers only within one reading: a solver that keeps the real parts of
+/// complex solutions has more candidates, and so more chances to be near the truth, than one that drops them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// The closest to the truth, as the paper has it, of the exact candidates.
+    /// The exact candidate that is closest to the truth, which is the paper's choice.
     Exact,
-    /// The closest to the truth, of all kinds that were asked for.
+    /// The closest to the truth among candidates of all requested kinds.
     All,
-    /// The one of them that explains further points best: what can be had without the truth.
+    /// The candidate that explains further points best. It can be chosen without knowing the truth.
     Selected,
 }
 

@@ -1,7 +1,8 @@
 //! Numbers of twice the length, for images that are as true as an `f64` can be.
 //!
-//! A scene without noise stands for the truth: what its images miss of it a solver cannot find. Computed in plain `f64` they are off
-//! by several roundings, and the exact solution of such matches by three times as much as that of images rounded once.
+//! A scene without noise stands for the truth, and a solver cannot be more accurate than its images. Images computed in plain
+//! `f64` are off by several roundings. The exact solution of such matches is three times as far from the truth as that of images
+//! that were rounded once.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -31,7 +32,7 @@ impl Long {
         Self { high: high + low, low: low - ((high + low) - high) }
     }
 
-    /// The quotient, rounded once but for one case in 10¹⁵.
+    /// The quotient. It is rounded once, except in one case of 10¹⁵.
     fn over(self, divisor: Self) -> f64 {
         let quotient = self.high / divisor.high;
         let rest = (-quotient).mul_add(divisor.high, self.high) + (self.low - quotient * divisor.low);
@@ -46,8 +47,8 @@ impl Long {
 /// |q|² R x = (w² − u · u) x + 2 (u · x) u + 2 w (u × x),   q = (w, u)
 /// ```
 ///
-/// A quaternion of unit length to rounding stands for the rotation `R`, whatever its length: `|q|²` changes the length of the
-/// translation beside it in the last digit.
+/// A quaternion of any length stands for its rotation `R`. The translation is not multiplied by `|q|²`, which differs from 1 in
+/// the last digit; its length changes by that much beside `|q|² R x`.
 pub(super) fn image2(q_21: &UnitQuaternion<f64>, t_21: &Vector3<f64>, x1: &Vector3<f64>) -> [f64; 2] {
     let (w, u) = (q_21.w, q_21.imag());
     let dot = |a: &Vector3<f64>, b: &Vector3<f64>| {
@@ -72,8 +73,8 @@ mod tests {
     use super::*;
     use crate::simulate::sampling;
 
-    /// Of integers of 10 bits in the quaternion and of 35 in the point, numerator and denominator have up to 58 bits, and an integer
-    /// of 128 holds enough of the quotient to round it: more than 55 bits unless it is below 1e-4.
+    /// The quaternion has integers of 10 bits and the point integers of 35 bits, so numerator and denominator have up to 58 bits. An
+    /// integer of 128 bits then holds more than 55 bits of the quotient, enough to round it, unless it is below 1e-4.
     #[test]
     #[expect(clippy::cast_possible_truncation, reason = "integers are cast back to what they were drawn as")]
     fn images_are_rounded_once() {

@@ -10,7 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 /// The metric (61), `acos |q · q_est|` in `[0, π/2]`: HALF the angle of the rotation between the two.
 ///
-/// Computed from the sine and the cosine, since the arc cosine resolves nothing below 1e-8.
+/// It is computed from the sine and the cosine, because the arc cosine resolves nothing below 1e-8.
 #[must_use]
 pub fn rotation_metric(q: &UnitQuaternion<f64>, q_est: &UnitQuaternion<f64>) -> f64 {
     let d = q.inverse() * q_est;
@@ -19,8 +19,8 @@ pub fn rotation_metric(q: &UnitQuaternion<f64>, q_est: &UnitQuaternion<f64>) -> 
 
 /// The metric (62), `acos |t · t_est|` of the directions, in `[0, π/2]`: it ignores the SIGN of t.
 ///
-/// Zero where the true translation vanishes, as in the text after (63). An estimate without a direction gets
-/// the largest error, π/2, where there is one to be found.
+/// The error is zero if the true translation vanishes, as in the text after (63). If the truth has a direction and the
+/// estimate has none, the error is the largest, π/2.
 #[must_use]
 pub fn translation_metric(t: &Vector3<f64>, t_est: &Vector3<f64>) -> f64 {
     let Some(t) = t.try_normalize(0.0) else { return 0.0 };

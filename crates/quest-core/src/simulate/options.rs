@@ -13,8 +13,8 @@ pub enum Layout {
     Coplanar,
 }
 
-/// How camera 2 is moved. Where there is a translation, it is uniform in the box `[−1, 1]³`, which keeps camera 2
-/// out of the box of the points whatever the rotation.
+/// How camera 2 is moved. A translation is uniform in the box `[−1, 1]³`, which keeps camera 2 out of the box of the
+/// points for every rotation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motion {
     /// Rotation and translation.
@@ -43,13 +43,12 @@ pub enum Angle {
 pub enum View {
     /// Every point, as in section 9, in front of camera 2 or behind it.
     ///
-    /// A point behind is projected by (27) all the same: its image is `(x/z, y/z, 1)` and its true depth is
-    /// negative. Only points so close to the plane `z = 0` of a camera that their image lies a thousand focal
-    /// lengths off the axis are drawn again.
+    /// A point behind the camera is projected by (27) too: its image is `(x/z, y/z, 1)` and its true depth is
+    /// negative. A point is drawn again only if it is so close to the plane `z = 0` of a camera that its image lies a
+    /// thousand focal lengths off the axis.
     #[default]
     Everywhere,
-    /// Points in front of both cameras and inside both images of 1024 × 768 pixels. Points that are not are
-    /// drawn again.
+    /// Points in front of both cameras and inside both images of 1024 × 768 pixels. Other points are drawn again.
     InBothImages,
 }
 

@@ -12,7 +12,7 @@ const OUTLIERS: u64 = 0x6f75_746c_6965_7273;
 
 impl Scene {
     /// Replaces a share of the matches, chosen at random, by false ones: their points in view 2 are uniform in the image.
-    /// Which matches are true is returned. The points of the scene stay as they are.
+    /// Returns which matches are true. The points of the scene stay as they are.
     ///
     /// # Errors
     /// [`MatchError`] where a point of view 1 has no image in front of the camera.

@@ -12,9 +12,9 @@ use crate::{Correspondence, InputError, RelativePose, correspondence};
 const LARGEST_IMAGE_COORDINATE: f64 = 1e3;
 /// How many motions are tried.
 const MAX_MOTIONS: usize = 2_000;
-/// How many draws one point gets to be seen at a given motion.
+/// How often one point is drawn, at a given motion, until both cameras see it.
 const MAX_DRAWS: usize = 200;
-/// How many times the length of t and the points that are not seen with it are redone in turn.
+/// How often the length of t, and then the points that are not seen with it, are computed again.
 const MAX_ROUNDS: usize = 50;
 
 /// Points seen by two cameras, and the pose between them.
@@ -40,12 +40,12 @@ impl Scene {
         Self::with_further(options, 0, seed, index).map(|(scene, _)| scene)
     }
 
-    /// The same scene, and matches of this many further points of it, seen and disturbed as its own are. Of a point
-    /// behind camera 2, which [`View::Everywhere`] allows, the bearing points backwards, as an all-round camera's does:
-    /// its depth is known to be positive.
+    /// The same scene, and matches of this many further points, which are seen and disturbed like its own. With
+    /// [`View::Everywhere`] a point may lie behind camera 2. Its bearing then points backwards, as that of an all-round
+    /// camera does, so its depth is known to be positive.
     ///
-    /// They are drawn last: the scene does not depend on their number, and its scale and parallax are those of its
-    /// own points.
+    /// The further points are drawn last. The scene does not depend on their number, and its scale and parallax are those
+    /// of its own points.
     ///
     /// # Errors
     /// Those of [`Scene::generate`].
@@ -148,8 +148,8 @@ impl Draft {
         Self { q_21, t_21, region: Region::new(rng, options.layout) }
     }
 
-    /// Draws the points. With a given parallax the length of t depends on all of them, and whether one of them
-    /// is seen depends on t: both are redone in turn until they agree.
+    /// Draws the points. With a given parallax the length of t depends on all points, and whether a point is seen
+    /// depends on t, so both are computed in turn until they agree.
     fn fill(
         &self,
         rng: &mut ChaCha8Rng,
@@ -169,7 +169,7 @@ impl Draft {
         None
     }
 
-    /// Points to be seen beside the others; `None` where they are too hard to find.
+    /// Further points that both cameras see; `None` if they are too hard to find.
     fn further(
         &self,
         rng: &mut ChaCha8Rng,

@@ -1,4 +1,4 @@
-//! Errors of candidates: the smallest there are, or those of one chosen without the truth.
+//! Errors of candidates: the smallest errors, or those of a candidate that is chosen without the truth.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -29,8 +29,7 @@ impl PoseErrors {
     /// The smallest errors among candidates, each metric by itself; `None` where there is no candidate.
     ///
     /// Section 9 takes "the solution candidate that is closest to the ground truth". Rotation and translation are
-    /// compared on their own there, so that the closest rotation and the closest translation may belong to two
-    /// candidates.
+    /// compared separately there, so the closest rotation and the closest translation may belong to two candidates.
     pub fn smallest<'a>(
         truth: &RelativePose,
         candidates: impl IntoIterator<Item = &'a Candidate>,
@@ -46,10 +45,9 @@ impl PoseErrors {
 /// The candidate that explains other matches of the scene best, chosen without the truth: the smallest mean Sampson
 /// error.
 ///
-/// The essential matrix alone cannot tell a pose from its twisted partner, but depths can. A point that the pose puts
-/// behind a camera is taken to be infinitely far away, where its depth says nothing, and the angle between its rays
-/// is its error. With [`View::Everywhere`] the candidate counts with t or −t, whichever is better: images of points
-/// behind camera 2 gave the solver no reason for a sign.
+/// The essential matrix alone cannot distinguish a pose from its twisted partner, but depths can. A point that the pose puts
+/// behind a camera is taken to be infinitely far away, and the angle between its rays is its error. With
+/// [`View::Everywhere`] the better of t and −t is taken, because images of points behind camera 2 do not determine the sign.
 pub fn choose<'a>(
     candidates: impl IntoIterator<Item = &'a Candidate>,
     others: &[Correspondence],
@@ -65,7 +63,7 @@ pub fn choose<'a>(
     best.0
 }
 
-/// The sum of the errors, or something above `limit` as soon as it is known to exceed it.
+/// The sum of the errors. Once it exceeds `limit`, the result is some number above `limit`.
 fn cost(pose: &RelativePose, others: &[Correspondence], view: View, limit: f64) -> f64 {
     let r_21 = pose.r_21();
     let t = pose.t_21.try_normalize(0.0);

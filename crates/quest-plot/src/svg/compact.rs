@@ -65,7 +65,7 @@ fn reduced(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
     if smooth.len() > SMOOTH { thinned(&points, TOLERANCE_OF_NOISE) } else { smooth }
 }
 
-/// Of neighbours in the same column of units, as in noise over time, the first and the last, the highest and the lowest.
+/// Keeps the first, the last, the highest and the lowest of neighbours in one column of units, for curves such as noise over time.
 fn columns(points: &[[i32; 2]]) -> Vec<[i32; 2]> {
     let mut kept = Vec::with_capacity(points.len());
     for column in points.chunk_by(|a, b| a[0].div_euclid(FINE) == b[0].div_euclid(FINE)) {
