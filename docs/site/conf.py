@@ -1,0 +1,114 @@
+"""Configuration of the documentation site; `scripts/docs` builds it.
+
+Pages of the repository are not copied. A line `<!-- include: docs/RESULTS.md -->` in a page stands for that file; with
+`below` at the end its headings become one level deeper. A file that does not exist is left out.
+"""
+
+import inspect
+import os
+import re
+import types
+from pathlib import Path
+
+import quest_pose
+
+ROOT = Path(__file__).resolve().parents[2]
+
+project = "quest-pose"
+author = "the quest-pose contributors"
+release = quest_pose.__version__
+repository = "https://github.com/quest-pose/quest-pose"
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["build"]
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 4
+# The docstrings are in NumPy's form.
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+
+html_theme = "furo"
+html_title = "quest-pose"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
+html_theme_options = {"source_repository": repository, "source_branch": "main", "source_directory": "docs/site/"}
+# Sphinx has lexers for `console` and `text`; Pygments has none for JSON Lines and the like, which are `text` here.
+highlight_language = "text"
+
+# Files of the repository that are pages here. Links to other files lead to the repository.
+PAGES = {
+    "README.md": "index",
+    "CONVENTIONS.md": "guides/conventions",
+    "crates/quest-core/CONVENTIONS.md": "guides/conventions",
+    "crates/quest-py/README.md": "api",
+    "docs/RESULTS.md": "results",
+    "docs/servoing.md": "servoing-results",
+    "docs/servo-recipes.md": "guides/servoing",
+    "docs/switching.md": "guides/switching",
+    "docs/errata.md": "errata",
+    "benches/README.md": "benches",
+    "benches/RESULTS.md": "speed",
+    "ARCHITECTURE.md": "architecture",
+    "CONTRIBUTING.md": "contributing",
+    "CHANGELOG.md": "changelog",
+}
+INCLUDE = re.compile(r"^<!-- include: (\S+)( below)? -->$", re.MULTILINE)
+LINK = re.compile(r"(!?)(\[[^\]\n]*\])\(([^)\s]+)\)")
+
+
+def page_link(source: Path, folder: str, match: re.Match) -> str:
+    """A link of a file of the repository, as a link of this site."""
+    image, text, target = match.groups()
+    if target.startswith(("http", "#", "mailto:")):
+        return match[0]
+    name, _, anchor = target.partition("#")
+    path = Path(os.path.normpath(source.parent / name))
+    if not path.exists():
+        raise ValueError(f"{source.relative_to(ROOT)} links to {target}, which does not exist")
+    inside = path.relative_to(ROOT).as_posix()
+    if image:
+        return f"!{text}({os.path.relpath(path, folder)})"
+    if inside in PAGES:
+        return f"{text}(/{PAGES[inside]}.md{'#' + anchor if anchor else ''})"
+    return f"{text}({repository}/{'tree' if path.is_dir() else 'blob'}/main/{inside})"
+
+
+def included(folder: str, match: re.Match) -> str:
+    """What stands for the line of an include."""
+    source = ROOT / match[1]
+    if not source.exists():
+        return ""
+    # Blocks of code are left as they are: they hold brackets that are no links, and `#` that are no headings.
+    parts = re.split(r"(^```.*?^```$)", source.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for k in range(0, len(parts), 2):
+        parts[k] = LINK.sub(lambda m: page_link(source, folder, m), parts[k])
+        if match[2]:
+            parts[k] = re.sub(r"^#", "##", parts[k], flags=re.MULTILINE)
+    return "".join(parts)
+
+
+def include_files(app, docname, content):
+    folder = os.path.dirname(app.env.doc2path(docname))
+    for name, _ in INCLUDE.findall(content[0]):
+        app.env.note_dependency(str(ROOT / name))
+    content[0] = INCLUDE.sub(lambda m: included(folder, m), content[0])
+
+
+def plain_docstring(app, what, name, obj, options, lines):
+    """Properties written in Rust say `name : type : text`, as their help shows it: the type comes to its own line."""
+    if lines and inspect.isgetsetdescriptor(obj):
+        kind, colon, text = lines[0].partition(" : ")
+        if colon:
+            lines[:1] = [f"*{kind}*", "", text]
+    # `x1[b]_` and `**kw` are no references.
+    if isinstance(obj, types.ModuleType):
+        del lines[:]
+
+
+def setup(app):
+    app.connect("source-read", include_files)
+    app.connect("autodoc-process-docstring", plain_docstring, priority=400)
