@@ -159,9 +159,9 @@ fn failures(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 /// Errors of one solve with noise: of the real solutions, then of all candidates.
 #[derive(Clone, Copy, Debug)]
 struct Noisy {
-    /// Of the candidate nearest to the truth.
+    /// The errors of the candidate nearest to the truth.
     best: [f64; 2],
-    /// Of the candidate that fits the further points best.
+    /// The errors of the candidate that fits the further points best.
     chosen: [f64; 2],
     candidates: [usize; 2],
 }

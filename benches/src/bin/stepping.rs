@@ -102,7 +102,7 @@ fn rows<P: Plant, L: ControlLaw + Clone>(
     }
 }
 
-/// Of every image its fastest µs, of every run those of the image with the first pose, and how many images had one.
+/// The fastest µs of every image, those of the image with the first pose of every run, and how many images had a pose.
 #[derive(Default)]
 struct Times {
     all: Vec<f64>,

@@ -57,7 +57,7 @@ pub(crate) struct Arguments {
     /// How many goal images are averaged.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     goal_images: u16,
-    /// So many images late is what the controller gets.
+    /// Delay of the images that the controller gets, in images.
     #[arg(long, value_name = "N", default_value_t = 0)]
     delay: u16,
     /// How poses are made: a filter on the goal's depths, or one candidate of each image by a rule.

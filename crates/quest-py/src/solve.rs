@@ -23,16 +23,16 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 /// solver : str, optional
 ///     One of the names in ``solvers()``; the first of them where absent.
 /// kinds : {"all", "exact", "planar"}
-///     Whether to return every candidate, the real solutions of the constraints alone, or beside every
-///     candidate the motions of a plane, if one explains the matches.
+///     Which candidates to return. ``"all"``: every candidate. ``"exact"``: the real solutions of the constraints
+///     alone. ``"planar"``: every candidate, and the motions of a plane if one explains the matches.
 ///
 /// Returns
 /// -------
 /// list of Candidate
-///     Best first: most points in front of both cameras, then the smallest residual. Candidates with points
-///     behind a camera are among them; their ``feasible`` is False. Empty where the constraints have no real
-///     solution and those alone were asked for. Matches that a rotation alone explains give that rotation,
-///     with ``t = 0``.
+///     Best first: most points in front of both cameras, then the smallest residual. The list includes candidates
+///     with points behind a camera; their ``feasible`` is False. It is empty if the constraints have no real
+///     solution and ``kinds`` is ``"exact"``. Matches that a rotation alone explains give that rotation, with
+///     ``t = 0``.
 ///
 /// Raises
 /// ------
@@ -47,7 +47,7 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 /// BadCamera
 ///     For an impossible camera, or a pixel for which it has no viewing ray.
 /// QuestError
-///     The base of these, itself for an unknown ``solver`` or ``kinds``.
+///     For an unknown ``solver`` or ``kinds``. It is also the base class of the errors above.
 ///
 /// Notes
 /// -----

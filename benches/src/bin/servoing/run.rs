@@ -50,7 +50,7 @@ const IMAGES: usize = 600;
 const SETTLED: usize = 50;
 /// About how far the features are, in metres.
 const UNIT: f64 = 2.0;
-/// Of the image, in pixels.
+/// The border of the image, in pixels.
 const BORDER: f64 = 40.0;
 const PLANE: Plane = Plane { tilt: 0.002, height: 0.001 };
 

@@ -7,8 +7,8 @@ use crate::algebra::vectors::two::Two;
 /// Brings the first `R` columns of an `R × C` matrix to the identity, by row operations with partial
 /// pivoting, for the rows from `keep` on; the rows above are spent on the way and left as they are.
 ///
-/// Of the rows that are kept only the columns from `R` on are valid afterwards. Returns the smallest pivot over
-/// the largest one: zero where the matrix is singular, and then nothing is valid.
+/// Afterwards only the columns from `R` on are valid in the rows that are kept. Returns the smallest pivot over the largest
+/// one. It is zero if the matrix is singular, and then nothing is valid.
 pub(crate) fn reduce<const R: usize, const C: usize>(a: &mut [[f64; C]; R], keep: usize) -> f64 {
     const { assert!(R <= 64) }
     let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);

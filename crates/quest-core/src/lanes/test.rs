@@ -94,7 +94,7 @@ fn lanes_are_the_scalar_solver() {
     }
 }
 
-/// Of nearly coincident solutions rounding decides which are real, and either of the two may lose a pair.
+/// Rounding decides which of nearly coincident solutions are real, so either of the two solvers may lose a pair.
 #[test]
 #[ignore = "ten seconds: 100,000 scenes"]
 fn lanes_are_the_scalar_solver_a_hundred_thousand_times() {

@@ -33,8 +33,8 @@ pub enum Kinds {
     All,
     /// The real solutions alone.
     Exact,
-    /// Every kind, and the motions of the plane that explains the matches, where there is one: for scenes that may be
-    /// flat. [`Quest`], [`QuestEigen`] and [`Relinearization`] have them; to the others this is [`Kinds::All`].
+    /// Every kind, and the motions of a plane if one explains the matches: for scenes that may be flat. [`Quest`],
+    /// [`QuestEigen`] and [`Relinearization`] have them. For the other solvers this is the same as [`Kinds::All`].
     Planar,
 }
 
@@ -52,7 +52,7 @@ impl Kinds {
         }
     }
 
-    /// What is left to a solver when the motions of a plane are seen to.
+    /// The kinds that remain for a solver after the motions of a plane were added.
     pub(crate) fn without_plane(self) -> Self {
         if self == Self::Planar { Self::All } else { self }
     }

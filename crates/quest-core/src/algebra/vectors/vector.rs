@@ -156,8 +156,8 @@ lanes!(f32, Single, SingleMask, f32s, m32s, F32_LANES: [
     splat_f32s add_f32s sub_f32s mul_f32s div_f32s neg_f32s mul_add_e_f32s negate_mul_add_e_f32s sqrt_f32s
     abs_f32s less_than_f32s select_f32s and_m32s or_m32s reduce_sum_f32s first_true_m32s as_simd_f32s as_mut_simd_f32s
 ]
-    /// Of sixteen lanes, for which dividers and square roots take four times as long as for eight: from the exponent, halved, by
-    /// two of Newton's steps.
+    /// For sixteen lanes, whose dividers and square roots take four times as long as those of eight. It starts from half the
+    /// exponent and takes two of Newton's steps.
     #[inline(always)]
     fn inverse_sqrt(self) -> Self {
         let Self(x, simd, _) = self;

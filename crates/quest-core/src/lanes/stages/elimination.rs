@@ -22,7 +22,7 @@ struct Reflection<L: Lanes<f64>, const K: usize> {
 }
 
 impl<L: Lanes<f64>, const K: usize> Reflection<L, K> {
-    /// That which makes zero what is behind entry `K` of a column, which it is applied to.
+    /// The reflection that makes the entries of column `x` behind `K` zero. It is applied to the column.
     #[inline(always)]
     fn new(lanes: L, x: &mut Column<L>, pivots: &mut Pivots<L>) -> Self {
         let mut v = *x;

@@ -44,7 +44,7 @@ pub(crate) fn normalized<L: Lanes<f64>, const N: usize>(lanes: L, a: [F<L>; N]) 
     scaled::<L, N>(a, lanes.splat(1.0) / dot::<L, N>(&a, &a).sqrt())
 }
 
-/// Of three vectors the longest, and its squared length.
+/// The longest of three vectors, and its squared length.
 #[inline(always)]
 pub(crate) fn longest<L: Lanes<f64>>(vectors: &[Vector3<L>; 3]) -> (Vector3<L>, F<L>) {
     let mut best = vectors[0];

@@ -18,7 +18,7 @@ pub struct Disturbances {
     pub outliers: f64,
     /// The share of images that show the features as seen from somewhere else.
     pub wrong_images: f64,
-    /// So many images old is what the controller gets.
+    /// Delay of the images that the controller gets, in images.
     pub delay: usize,
     /// From the first image of this range to before the last one, only so many features are found.
     pub lost: Option<(std::ops::Range<usize>, usize)>,

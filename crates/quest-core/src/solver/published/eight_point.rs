@@ -18,7 +18,7 @@
 //!    values equal.
 //! 4. Two rotations and a translation; the rotation with most points in front comes first.
 //!
-//! Neither candidate is refined. Both are [`Exact`](crate::CandidateKind::Exact), the residual says how well they fit.
+//! The candidates are not refined. Both are [`Exact`](crate::CandidateKind::Exact); the residual says how well they fit.
 //!
 //! **Degenerate**: eight matches with fewer than eight independent constraints, as of coplanar points, for which every
 //! number of matches gives only six; an exact pure rotation. With little parallax, or points in a shallow box, the

@@ -9,13 +9,13 @@
 //! 1. The null space `E = x X + y Y + z Z + w W` of the five epipolar constraints, `w = 1`.
 //! 2. The ten cubics of the trace constraint and the determinant, with `z` hidden, are a cubic eigenvalue problem
 //!    `(C0 + z C1 + z² C2 + z³ C3) v = 0` in the monomials `v` of `x` and `y` (`hidden_variable.rs`).
-//! 3. `C3` is singular, so that the problem is reversed: `α = 1/z`, `(α³ C0 + α² C1 + α C2 + C3) v = 0`, and multiplied by the
+//! 3. `C3` is singular, so the problem is reversed: `α = 1/z`, `(α³ C0 + α² C1 + α C2 + C3) v = 0`, and multiplied by the
 //!    inverse of `C0`. Linearised, `α (v, αv, α²v)` is a 30 × 30 matrix times `(v, αv, α²v)`.
-//! 4. Of the ten columns of `C1` six are not zero, of `C2` three, of `C3` one. The other twenty columns of the 30 × 30 matrix are zero,
-//!    and so are as many eigenvalues, which are no solutions: dropped with their rows, they leave a 10 × 10 matrix.
+//! 4. Six of the ten columns of `C1` are not zero, three of `C2` and one of `C3`. The other twenty columns of the 30 × 30 matrix
+//!    are zero. They give twenty zero eigenvalues, which are no solutions. Without them and their rows a 10 × 10 matrix is left.
 //! 5. Its eigenvalues are `α` at the ten solutions. `x` and `y` are the null vector of six of the equations there.
-//! 6. Two rotations and a translation of each essential matrix. Of a complex pair the real parts of both rotations are
-//!    kept, with the translation that fits best, as [`FromComplex`](crate::CandidateKind::FromComplex).
+//! 6. Each essential matrix gives two rotations and a translation. A complex pair gives the real parts of both rotations,
+//!    with the translation that fits best, as [`FromComplex`](crate::CandidateKind::FromComplex).
 //!
 //! The 10 × 10 matrix multiplies by `1/z` modulo the cubics: it is the action matrix of [`stewenius`](crate::solver::published::stewenius) with `z` and
 //! `w` exchanged, found without a Gröbner basis.

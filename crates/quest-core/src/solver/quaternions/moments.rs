@@ -1,19 +1,19 @@
 //! The null space of the relinearised system of five matches, without that system.
 //!
 //! A null vector of `D̄` is a symmetric form on the quartics modulo the fifteen minors (a value for each product of two directions
-//! `s_i s_j`) which depends on the product alone: a linear functional `L` on the polynomials of degree 8 that vanishes on all
-//! multiples of the minors, the *moments* of which are its values at monomials. There are as many as common zeros,
-//! twenty, each the value at one of them, and `D̄` is but another way to the same quotient of the ring of polynomials.
+//! `s_i s_j`) that depends on the product alone. It is a linear functional `L` on the polynomials of degree 8 that vanishes on all
+//! multiples of the minors. Its *moments* are its values at monomials. There are as many such functionals as common zeros: twenty,
+//! each of which is the value at one zero. `D̄` is another way to the same quotient of the ring of polynomials.
 //!
 //! 1. Reduce the minors to a basis `b_1 … b_20` of the monomials with `q1` and fifteen monomials in terms of it: 15 × 35.
-//! 2. Of the paper's `s_l` take a combination that is `(q·q) f` with a quadratic form `f`. Then `W_0` and `W_l` are
-//!    `L_k((q·q)² b_i)` and `L_k((q·q) f b_i)`. Multiplying by `q·q` takes polynomials of degree 6 modulo the minors to those of
-//!    degree 8 one to one, for no common zero has `q·q = 0`: so that functionals on degree 6 are enough,
+//! 2. Combine the paper's `s_l` to `(q·q) f` with a quadratic form `f`. Then `W_0` and `W_l` are
+//!    `L_k((q·q)² b_i)` and `L_k((q·q) f b_i)`. No common zero has `q·q = 0`, so multiplying by `q·q` takes polynomials of degree 6
+//!    modulo the minors to those of degree 8 one to one. Functionals on degree 6 are therefore enough:
 //!    `W_0 = L_k((q·q) b_i)` and `W_l = L_k(f b_i)`. The twenty with `L_k(q1² b_i) = δ_ki` are a basis.
 //! 3. Their moments follow from step 1 for monomials with `q1²`, and from the product of two of its rows for those
 //!    with `q1`.
-//! 4. The eigenvalues of `W_0⁻¹ W_l` are `f / (q·q)` at the twenty solutions, of which no real one is large; the eigenvectors are
-//!    the functionals `r` of (51) that are the values at a solution, so that their entries are `q1² b_i` there.
+//! 4. The eigenvalues of `W_0⁻¹ W_l` are `f / (q·q)` at the twenty solutions; no real one is large. The eigenvectors are
+//!    the functionals `r` of (51) that are the values at a solution, so their entries are `q1² b_i` there.
 //!
 //! Section 7.1 multiplies by `q2 / q1` instead of `f / (q·q)`.
 
