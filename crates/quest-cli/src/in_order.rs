@@ -1,15 +1,15 @@
-//! Processes a stream on all cores and returns the results in the order of the stream.
+//! Work on a stream by all cores, the results in the order of the stream.
 
 use std::panic::resume_unwind;
 use std::sync::Mutex;
 use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread;
 
-/// How many results of each thread may wait for an earlier one.
+/// Results, for each thread, that may wait for an earlier one.
 const AHEAD: usize = 16;
 
-/// Hands `work` of every item to `sink`, in order and as soon as it is ready. An error of the sink ends the work. Items are
-/// taken on the thread of the caller, at most a few for each core ahead of the sink.
+/// Hands `work` of every item to `sink`, in order and as soon as it is there; an error of the sink ends it. Items are taken
+/// on the thread of the caller, no more of them than a few for each core ahead of the sink.
 pub(crate) fn in_order<T: Send, R: Send, E: Send>(
     items: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Sync,

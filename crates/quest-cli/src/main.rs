@@ -1,6 +1,6 @@
 //! `quest-cli`: camera poses from matched points.
 //!
-//! Each subcommand has one file: its arguments, one call, a table. Data goes to standard output, messages to standard error.
+//! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
 mod estimate;
@@ -53,7 +53,7 @@ enum Command {
     Solvers(solvers::Arguments),
 }
 
-/// The exit status of a run without an error.
+/// What the exit status says of a run that went well.
 enum Outcome {
     Answer,
     NoPose,
@@ -70,7 +70,7 @@ enum Failure {
     Scene(#[from] quest_core::simulate::SceneError),
     #[error(transparent)]
     Plot(#[from] quest_plot::PlotError),
-    /// Arguments that contradict each other.
+    /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
 }

@@ -1,4 +1,4 @@
-//! A progress bar on standard error for work that takes longer than a second.
+//! A bar on standard error for what takes longer than a second.
 
 use std::io::{self, IsTerminal};
 use std::sync::Once;
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// The bar appears after this time.
+/// Nothing is shown before.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Counts finished items, on any thread. On a terminal it shows the count after a second.
+/// Counts what is done, on any thread; on a terminal, after a second, where people can see it.
 pub(crate) struct Progress {
     bar: ProgressBar,
     start: Instant,
@@ -18,7 +18,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// A count of `noun`, with the total if it is known.
+    /// A count of `noun`, out of a total where that is known.
     pub(crate) fn new(noun: &'static str, total: Option<u64>, quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(total, ProgressDrawTarget::hidden());
         let template = match total {
@@ -33,12 +33,12 @@ impl Progress {
         Self { bar, start: Instant::now(), shown: Once::new(), is_wanted }
     }
 
-    /// Sets the text in front of the bar: what is being done.
+    /// What is being done, ahead of the bar.
     pub(crate) fn begin(&self, part: String) {
         self.bar.set_prefix(part);
     }
 
-    /// Adds this many finished items.
+    /// So many more are done.
     pub(crate) fn add(&self, count: u64) {
         if self.is_wanted && self.start.elapsed() > PATIENCE {
             self.shown.call_once(|| self.bar.set_draw_target(ProgressDrawTarget::stderr()));

@@ -6,9 +6,9 @@
 //! n · t = 0        z1 = −(b × t) · n / |n|²        z2 = −(c × t) · n / |n|²
 //! ```
 //!
-//! These are the least-squares depths if the two rays do not meet. At a solution they are, with t, the null vector of the
-//! matrix `B` of (58), (59) up to its scale. The common scale makes the mean absolute depth over both views 1, so `|t|` is the
-//! parallax (63) and goes to zero with it.
+//! the least-squares depths where the two rays do not meet, and at a solution the null vector of the matrix `B` of
+//! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
+//! `|t|` is then the parallax (63), and goes to zero with it.
 
 use std::array::from_fn;
 
@@ -64,7 +64,7 @@ pub struct Completed {
 /// The pose with rotation `q_21` and a translation along `direction` (a unit vector, of either sign): the sign
 /// puts more of the points in front of the cameras, the length makes the mean absolute depth 1.
 ///
-/// The translation is zero if no match has a depth.
+/// Where no match has a depth the translation is zero.
 #[must_use]
 pub fn with_depths(
     q_21: UnitQuaternion<f64>,
@@ -123,8 +123,8 @@ pub(crate) fn two_pairs_with_depths(
     [tally.completed(q_21, direction, matches), twisted.completed(&twin, direction, matches)]
 }
 
-/// Products of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation. The pairs are two matches, or one match
-/// after two rotations.
+/// What is needed of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: two matches, or one match after
+/// two rotations.
 struct Rays {
     /// `b × c`.
     normal: TwoVectors,
@@ -145,8 +145,7 @@ impl Rays {
         Self { normal, cosine: dot(b, &c), along, squares }
     }
 
-    /// The same products with `c' = 2 (t · c) t − c`, the ray after the twisted rotation. The angles to `t` stay the same, and
-    /// the constraint changes only its sign.
+    /// Of `c' = 2 (t · c) t − c`, as after the twisted rotation. The angles to `t` stay, and the constraint but for its sign.
     #[inline]
     fn twisted(&self, b: &TwoVectors, t: &TwoVectors) -> Self {
         let [tb, tc] = self.along;
@@ -156,7 +155,7 @@ impl Rays {
     }
 }
 
-/// Sums over the matches from which the sign and the length of a translation follow.
+/// What the matches say of the sign and the length of a translation: sums over those on either side.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     front: Two,

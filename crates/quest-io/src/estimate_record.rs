@@ -13,7 +13,8 @@ pub struct EstimateRecord {
     /// What the input calls the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// A name of [`quest_core::robust::Model`]; `degenerate` if the matches determine no pose, `None` if no pose was found.
+    /// A name of [`quest_core::robust::Model`]; `degenerate` where the matches determine no pose, `None` where none could be
+    /// found.
     pub model: Option<&'static str>,
     /// Why there is no pose.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,7 +35,7 @@ pub struct EstimateRecord {
     pub translation_error_deg: Option<f64>,
 }
 
-/// What an estimate found. The fields are those of [`Estimate`].
+/// What an estimate found. Fields as those of [`Estimate`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FoundRecord {
     /// The pose.

@@ -12,7 +12,7 @@ use crate::{
     json_file,
 };
 
-/// The name of standard input in messages.
+/// What standard input is called in messages.
 pub const STANDARD_INPUT: &str = "standard input";
 
 /// The form of a file.
@@ -20,7 +20,7 @@ pub const STANDARD_INPUT: &str = "standard input";
 pub enum Format {
     /// One JSON object: one pair.
     Json,
-    /// One JSON object on each line; each is one pair.
+    /// One JSON object a line: one pair each.
     JsonLines,
     /// `u1,v1,u2,v2[,score]`, one match a row: one pair.
     Csv,
@@ -39,7 +39,7 @@ impl Format {
     }
 }
 
-/// The pairs of a file, one after the other. The iterator ends after an error.
+/// The pairs of a file, one after the other; after an error there are no more.
 pub struct Pairs {
     place: Place,
     format: Format,
@@ -50,8 +50,8 @@ pub struct Pairs {
     done: bool,
 }
 
-/// Opens `path`, or standard input for `-`. Without a `format` the extension decides. If the extension is not known, the
-/// beginning of the text decides.
+/// Opens `path`, or standard input for `-`. Without a `format` the extension decides, and where there is none
+/// that is known, the beginning of the text.
 ///
 /// # Errors
 /// A file that is missing, unreadable, a directory, or empty where its beginning is needed.
@@ -82,7 +82,7 @@ fn open(path: &Path) -> Result<Box<dyn BufRead>, Fault> {
     Ok(Box::new(BufReader::new(File::open(path)?)))
 }
 
-/// The form that the beginning of the text shows, and the beginning itself, which was read from `input`.
+/// The form that the beginning of the text has, and the beginning, which was taken from `input`.
 fn sniff(input: &mut dyn BufRead) -> io::Result<(Format, Vec<u8>)> {
     let mut text = Vec::new();
     let first = next_line(input, &mut text)?;
@@ -96,7 +96,7 @@ fn sniff(input: &mut dyn BufRead) -> io::Result<(Format, Vec<u8>)> {
     Ok((format, text))
 }
 
-/// The next line that is not blank, trimmed. Everything that was read is appended to `text`.
+/// The next line that is not blank, trimmed; all that was read is appended to `text`.
 fn next_line(input: &mut dyn BufRead, text: &mut Vec<u8>) -> io::Result<Vec<u8>> {
     loop {
         let mut line = Vec::new();
