@@ -3,7 +3,9 @@
 use quest_benches::SEED;
 use quest_benches::cells::Cell;
 use quest_core::Candidates;
-use quest_core::lanes::{BatchSolver, Essentials, ImageMatches, Instructions, Loss, Scorer, Stop, Tolerance};
+use quest_core::lanes::{
+    BatchSolver, Essentials, ImageMatches, Instructions, Scorer, SearchScore, Stop, Tolerance,
+};
 use quest_core::simulate::{Motion, Scene, SceneOptions};
 use quest_core::solver::SolverName;
 
@@ -53,7 +55,7 @@ fn no_batch_in_lanes_allocates() {
                 solver.solve_all(&scene.matches, &samples, &mut found).unwrap();
                 found.candidates(0, &scene.matches[..5], &mut candidates);
                 for e in &found.matrices()[..5] {
-                    std::hint::black_box(scorer.score(&image, e, 1e-3, Loss::default(), Stop::Never));
+                    std::hint::black_box(scorer.score(&image, e, 1e-3, SearchScore::default(), Stop::Never));
                     std::hint::black_box(scorer.inliers(&image, e, 1e-3, &mut mask));
                 }
             };

@@ -9,8 +9,8 @@ use clap::Parser;
 use quest_benches::kinds::SceneKind;
 use quest_benches::{SEED, errors, kinds, parallel};
 use quest_core::lanes::{
-    BatchSolver, BearingMatches, Essentials, ImageMatches, Instructions, Loss, MatchColumns, Real, Scorer,
-    Stop, Tolerance,
+    BatchSolver, BearingMatches, Essentials, ImageMatches, Instructions, MatchColumns, Real, Scorer,
+    SearchScore, Stop, Tolerance,
 };
 use quest_core::simulate::{Scene, SceneError, SceneOptions};
 use quest_core::{Candidates, Correspondence};
@@ -137,7 +137,7 @@ fn scoring(arguments: &Arguments, scene: &Scene) {
     let e: [f64; 9] = std::array::from_fn(|i| e[(i / 3, i % 3)]);
     for instructions in available() {
         let Some(scorer) = Scorer::with_instructions(instructions) else { continue };
-        for loss in [Loss::Truncated, Loss::Marginalised] {
+        for loss in [SearchScore::Truncated, SearchScore::Marginalised] {
             println!(
                 "| {instructions:?} | {loss:?} | {:.2} | {:.2} | {:.2} | {:.2} |",
                 nanoseconds(arguments, scorer, &plane, &e, loss),
@@ -154,7 +154,7 @@ fn nanoseconds<T: Real>(
     scorer: Scorer,
     matches: &impl MatchColumns<T>,
     e: &[f64; 9],
-    loss: Loss,
+    loss: SearchScore,
 ) -> f64 {
     const CALLS: u32 = 64;
     let seconds = fastest(10 * arguments.rounds, || {

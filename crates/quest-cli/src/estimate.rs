@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use quest_core::lanes::Loss;
+use quest_core::lanes::SearchScore;
 use quest_core::robust::{self, Estimate, EstimateError, Options, Priors, ThirdView};
 use quest_core::solver::SolverName;
 use quest_core::{Correspondence, InputError};
@@ -78,8 +78,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
     /// What a match counts, by how far it is off: averaged over all thresholds up to one, or with one threshold (MSAC).
-    #[arg(long, value_name = "LOSS", default_value = Loss::default().name(), value_parser = loss_parser())]
-    loss: Loss,
+    #[arg(long, value_name = "LOSS", default_value = SearchScore::default().name(), value_parser = loss_parser())]
+    loss: SearchScore,
     /// The matches of view 1 with a third view: of two possible poses the one that agrees with them is taken.
     #[arg(long, value_name = "FILE")]
     third: Option<PathBuf>,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use quest_core::lanes::Loss;
+use quest_core::lanes::SearchScore;
 use quest_core::{
     Camera,
     solver::{Kinds, SolverName},
@@ -103,9 +103,10 @@ pub(crate) fn kinds_parser() -> impl clap::builder::TypedValueParser<Value = Kin
 }
 
 /// A loss by its name, with the names listed in the help.
-pub(crate) fn loss_parser() -> impl clap::builder::TypedValueParser<Value = Loss> {
+pub(crate) fn loss_parser() -> impl clap::builder::TypedValueParser<Value = SearchScore> {
     use clap::builder::{PossibleValuesParser, TypedValueParser};
-    PossibleValuesParser::new(Loss::CHOICES.map(Loss::name)).try_map(|name| name.parse::<Loss>())
+    PossibleValuesParser::new(SearchScore::CHOICES.map(SearchScore::name))
+        .try_map(|name| name.parse::<SearchScore>())
 }
 
 /// A solver by its name, with the names listed in the help.

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use pyo3::prelude::*;
 use quest_core::RelativePose;
-use quest_core::lanes::{Loss, UnknownLoss};
+use quest_core::lanes::{SearchScore, UnknownLoss};
 use quest_core::robust::{self, KnownDirection, Options, Priors};
 
 use crate::arrays;
@@ -123,7 +123,7 @@ pub(crate) fn estimate(
 }
 
 /// The loss of this name.
-pub(crate) fn loss_named(name: &str) -> PyResult<Loss> {
+pub(crate) fn loss_named(name: &str) -> PyResult<SearchScore> {
     name.parse().map_err(|error: UnknownLoss| QuestError::new_err(error.to_string()))
 }
 

@@ -68,4 +68,9 @@ mod test;
 pub use crate::algebra::vectors::instructions::Instructions;
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
-pub use score::{BearingMatches, ImageMatches, Loss, MatchColumns, Real, Score, Scorer, Stop, UnknownLoss};
+pub use score::{
+    BearingMatches, ImageMatches, MatchColumns, Real, Score, Scorer, SearchScore, Stop, UnknownLoss,
+};
+
+#[expect(deprecated, reason = "the old name stays for one version")]
+pub use score::Loss;

@@ -233,3 +233,51 @@ fn a_sample_of_a_match_that_is_not_there_is_an_error() {
         assert!(found.is_empty());
     }
 }
+
+/// The sides of the epipoles on which matches are, times their distances from them: the least and the most.
+fn sides(e: &[f64; 9], five: &[Correspondence]) -> [f64; 2] {
+    let e = nalgebra::Matrix3::from_row_slice(e);
+    let columns = [0, 1, 2].map(|k| e.column(k).into_owned());
+    let all = [0, 1, 2].map(|k| columns[k].cross(&columns[(k + 1) % 3]));
+    let t = all.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap();
+    let sides = five.iter().map(|m| t.cross(m.bearing2()).dot(&(e * m.bearing1())));
+    sides.fold([f64::MAX, f64::MIN], |[least, most], side| [least.min(side), most.max(side)])
+}
+
+#[test]
+fn oriented_matrices_are_those_that_a_pose_belongs_to() {
+    const CLEAR: f64 = 2e-4;
+    // Two hundred samples of true matches, and as many of matches of five scenes each.
+    let (matches, mut samples) = samples((0..200).map(|i| scene(5, 0.0, i)));
+    let false_samples =
+        (0..200_u32).map(|i| std::array::from_fn(|k| (5 * i + 6 * u32::try_from(k).unwrap()) % 1000));
+    samples.extend(false_samples);
+    for instructions in available() {
+        let solver = BatchSolver::with_instructions(Tolerance::Loop, instructions).unwrap();
+        let (mut all, mut oriented) = (Essentials::new(), Essentials::new());
+        solver.solve(&matches, &samples, &mut all).unwrap();
+        solver.solve_oriented(&matches, &samples, &mut oriented).unwrap();
+        for (k, sample) in samples.iter().enumerate() {
+            let five = sample.map(|i| matches[i as usize]);
+            let kept = &oriented.matrices()[oriented.of(k)];
+            for e in &all.matrices()[all.of(k)] {
+                let [least, most] = sides(e, &five);
+                let is_kept = kept.contains(e);
+                assert!(is_kept || least < CLEAR && most > -CLEAR, "{instructions:?} {k}: {least} {most}");
+                assert!(!is_kept || least > -CLEAR || most < CLEAR, "{instructions:?} {k}: {least} {most}");
+            }
+        }
+        let count = |samples: std::ops::Range<usize>| samples.map(|k| oriented.of(k).len()).sum::<usize>();
+        let is_truth = |k: &usize| {
+            let truth = scene(5, 0.0, *k as u64).truth.essential();
+            let truth: [f64; 9] = truth.transpose().as_slice().try_into().unwrap();
+            let scale = truth.iter().map(|x| x * x).sum::<f64>().sqrt() / 2.0_f64.sqrt();
+            let truth = truth.map(|x| x / scale);
+            oriented.matrices()[oriented.of(*k)].iter().any(|e| distance(e, &truth) < 1e-4)
+        };
+        // A sample in a hundred is flagged.
+        assert!((0..200).filter(is_truth).count() > 195, "{instructions:?}");
+        // Of 4.5 matrices of a false sample a sixteenth would be left, were the signs those of coins.
+        assert!(count(200..400) < 200, "{instructions:?}: {}", count(200..400));
+    }
+}

@@ -15,9 +15,11 @@
 //!
 //! # Steps
 //! 1. The matches are permuted once and written in columns of pixels (`data`).
-//! 2. Random samples are solved, their essential matrices scored over all matches and dropped as soon as they are
-//!    most likely worse than the best (`search::sampling`, `search::search_score`); the best are scored as poses, with the depths of their points
-//!    (`search::pose_score`), and refined over their inliers, until enough samples have been drawn (`search::stopping`).
+//! 2. Random samples are drawn, more of them from matches that move as their neighbours do (`search::guide`, `search::ranking`), and solved
+//!    (`search::hypotheses`). Their essential matrices are scored over all matches and dropped as soon as they are most likely worse
+//!    than the best (`search::search_score`); the best are scored as poses, with the depths of their points
+//!    (`search::pose_score`), and refined over their inliers, until the best would have been found again, and any other as
+//!    good (`search::guide`, `search::stopping`).
 //! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`).
 //! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`conclude::plane`). The best is refined once
 //!    more without the matches that agree with it by chance (`conclude::chance_inliers`).
@@ -54,10 +56,9 @@ pub use third_view::{ThirdView, estimate_with_third_view};
 use crate::degeneracy::diagnose;
 use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, Degeneracy, InputError};
-use conclude::Answer;
+use conclude::{Answer, false_alarms};
 use data::observations::Observations;
-use search::sampling::{self, Sampler};
-use search::{Limits, Search};
+use search::{Draws, Limits, Search, hypotheses, sampling};
 
 /// Fewer matches than this have no pose.
 pub const MIN_MATCHES: usize = 5;
@@ -159,14 +160,19 @@ fn search<'a>(
     {
         search.consider_pose(Motion { q_21: pose.q_21, direction });
     }
-    let size = options.solver.info().min_matches;
-    let mut sampler = Sampler::new(rng, observations.len(), size, priors.ranked(observations));
     let limits = Limits {
         confidence: options.confidence,
         min_iterations: options.min_iterations,
         max_iterations: options.max_iterations,
         is_cancelled,
     };
-    search.run(&mut sampler, &limits);
+    let mut source = hypotheses::of_solver(options.solver);
+    let size = options.solver.info().min_matches;
+    let draws = Draws { rng, size, given: priors.ranked(observations) };
+    let mut false_matches = None;
+    search.run(source.as_mut(), draws, &limits, &mut |pose, iterations| {
+        let false_matches = false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
+        false_alarms::log_false_alarms(pose, iterations, false_matches) > 0.0
+    });
     search
 }

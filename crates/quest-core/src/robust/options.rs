@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::lanes::Loss;
+use crate::lanes::SearchScore;
 use crate::robust::data::observations::Observations;
 use crate::solver::SolverName;
 use crate::{Camera, InputError, RelativePose};
@@ -22,7 +22,7 @@ pub struct Options {
     /// in radians for bearings.
     pub focal_lengths: [[f64; 2]; 2],
     /// What a match counts in the search, by how far it is off.
-    pub loss: Loss,
+    pub loss: SearchScore,
     /// How sure the search is to be that it has seen a good sample before it stops, in `(0, 1)`.
     pub confidence: f64,
     /// At least so many samples are drawn.
@@ -47,7 +47,7 @@ impl Default for Options {
         Self {
             threshold: 1e-3,
             focal_lengths: [[1.0; 2]; 2],
-            loss: Loss::default(),
+            loss: SearchScore::default(),
             confidence: 0.9999,
             min_iterations: 300,
             max_iterations: 100_000,
@@ -101,7 +101,8 @@ impl Options {
 /// What is known beside the matches.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Priors<'a> {
-    /// One a match, higher is better: samples are drawn from the best matches first.
+    /// One a match, higher is better: more samples are drawn from the best matches, beside those that move as their neighbours
+    /// do, and fewer are drawn where that helps.
     pub scores: Option<&'a [f64]>,
     /// A pose to begin with; the length of its translation plays no part.
     pub pose: Option<RelativePose>,
@@ -197,10 +198,12 @@ impl Priors<'_> {
     }
 
     /// The matches as observations, from the best to the worst.
-    pub(super) fn ranked(&self, observations: &Observations) -> Option<Vec<usize>> {
+    pub(super) fn ranked(&self, observations: &Observations) -> Option<Vec<u32>> {
         let scores = self.scores?;
-        let mut ranked: Vec<usize> = (0..observations.len()).collect();
-        ranked.sort_by(|&i, &j| scores[observations.order[j]].total_cmp(&scores[observations.order[i]]));
+        #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
+        let mut ranked: Vec<u32> = (0..observations.len() as u32).collect();
+        let score = |i: u32| scores[observations.order[i as usize]];
+        ranked.sort_by(|&i, &j| score(j).total_cmp(&score(i)));
         Some(ranked)
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::lanes::Loss;
+use crate::lanes::SearchScore;
 use crate::simulate::{FOCAL_LENGTH, Layout, Motion as SceneMotion, Scene, SceneOptions};
 use crate::solver::SolverName;
 use crate::{Camera, CameraModel, RelativePose, correspondence};
@@ -33,9 +33,9 @@ fn errors(pose: &RelativePose, truth: &RelativePose) -> [f64; 2] {
 
 #[test]
 fn planted_poses_are_found_among_outliers() {
-    let loss = Loss::Marginalised;
+    let loss = SearchScore::Marginalised;
     for (outliers, index, loss) in
-        [(0.0, 0, loss), (0.3, 1, loss), (0.5, 2, loss), (0.7, 3, loss), (0.5, 4, Loss::Truncated)]
+        [(0.0, 0, loss), (0.3, 1, loss), (0.5, 2, loss), (0.7, 3, loss), (0.5, 4, SearchScore::Truncated)]
     {
         let (scene, is_true) = scene(&noisy(200), outliers, index);
         let found = estimate(&scene.matches, &Options { loss, ..options() }).unwrap();

@@ -1,7 +1,7 @@
 //! The loops over all matches.
 
 use super::columns::{BLOCK, Kernel, MatchColumns, Real};
-use super::{Loss, Score, Stop};
+use super::{Score, SearchScore, Stop};
 use crate::algebra::vectors::lane::{F, Float, Lanes, MAX_LANES};
 
 /// The score of one matrix.
@@ -9,7 +9,7 @@ pub(super) struct Sum<'a, T, C> {
     pub(super) matches: &'a C,
     pub(super) e: [T; 9],
     pub(super) threshold: f64,
-    pub(super) loss: Loss,
+    pub(super) loss: SearchScore,
     pub(super) stop: Stop,
 }
 
@@ -19,8 +19,8 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Sum<'_, T, C> {
     #[inline(always)]
     fn run<L: Lanes<T>>(self, lanes: L) -> Score {
         match self.loss {
-            Loss::Truncated => self.sum::<L, Truncated>(lanes),
-            Loss::Marginalised => self.sum::<L, Marginalised>(lanes),
+            SearchScore::Truncated => self.sum::<L, Truncated>(lanes),
+            SearchScore::Marginalised => self.sum::<L, Marginalised>(lanes),
         }
     }
 }

@@ -3,8 +3,8 @@
 //! With `r` the Sampson error of a match and `T` the threshold, a match is an inlier where `r < T`, and counts
 //!
 //! ```text
-//! 1 − (r/T)²     Loss::Truncated         MSAC
-//! (1 − r/T)²     Loss::Marginalised      MSAC, averaged over all thresholds up to T
+//! 1 − (r/T)²     SearchScore::Truncated         MSAC
+//! (1 − r/T)²     SearchScore::Marginalised      MSAC, averaged over all thresholds up to T
 //! ```
 //!
 //! and nothing elsewhere. On image planes, with the points `x1 = (u1, v1, 1)`, `x2 = (u2, v2, 1)`,
@@ -37,7 +37,7 @@ use crate::algebra::vectors::instructions::{Instructions, Token};
 /// What a match within the threshold counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum Loss {
+pub enum SearchScore {
     /// `1 − (r/T)²`.
     Truncated,
     /// `(1 − r/T)²`.
@@ -45,7 +45,7 @@ pub enum Loss {
     Marginalised,
 }
 
-impl Loss {
+impl SearchScore {
     /// Every choice, the default first.
     pub const CHOICES: [Self; 2] = [Self::Marginalised, Self::Truncated];
 
@@ -59,15 +59,19 @@ impl Loss {
     }
 }
 
-/// No loss has this name.
+/// The name of [`SearchScore`] before version 0.2.
+#[deprecated(since = "0.2.0", note = "it is called `SearchScore` now")]
+pub type Loss = SearchScore;
+
+/// No search score has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("loss is {found:?}, expected one of {}", Loss::CHOICES.map(Loss::name).join(", "))]
+#[error("loss is {found:?}, expected one of {}", SearchScore::CHOICES.map(SearchScore::name).join(", "))]
 pub struct UnknownLoss {
     /// The name that was asked for.
     pub found: String,
 }
 
-impl FromStr for Loss {
+impl FromStr for SearchScore {
     type Err = UnknownLoss;
 
     fn from_str(name: &str) -> Result<Self, UnknownLoss> {
@@ -132,7 +136,7 @@ impl Scorer {
         matches: &impl MatchColumns<T>,
         e: &[f64; 9],
         threshold: f64,
-        loss: Loss,
+        loss: SearchScore,
         stop: Stop,
     ) -> Score {
         T::run(self.token, Sum { matches, e: e.map(T::from_f64), threshold, loss, stop })
@@ -179,10 +183,10 @@ mod tests {
     use crate::lanes::test::{available, scene};
 
     /// The score as the head of the module defines it.
-    fn defined(errors: &[f64], threshold: f64, loss: Loss) -> f64 {
+    fn defined(errors: &[f64], threshold: f64, loss: SearchScore) -> f64 {
         let count = |r: &f64| match loss {
-            Loss::Truncated => 1.0 - (r / threshold).powi(2),
-            Loss::Marginalised => (1.0 - r / threshold).powi(2),
+            SearchScore::Truncated => 1.0 - (r / threshold).powi(2),
+            SearchScore::Marginalised => (1.0 - r / threshold).powi(2),
         };
         errors.iter().filter(|r| **r < threshold).map(count).sum()
     }
@@ -211,7 +215,7 @@ mod tests {
         let threshold = 1e-3;
         for instructions in available() {
             let scorer = Scorer::with_instructions(instructions).unwrap();
-            for loss in [Loss::Truncated, Loss::Marginalised] {
+            for loss in [SearchScore::Truncated, SearchScore::Marginalised] {
                 let plane = defined(&on_plane, threshold, loss);
                 let sphere = defined(&on_sphere, threshold, loss);
                 assert!(plane > 20.0 && plane < 120.0, "the threshold has to part the matches");
@@ -253,16 +257,17 @@ mod tests {
         let right: [f64; 9] = right.as_slice().try_into().unwrap();
         let wrong = [0.0, -0.3, 0.2, 0.3, 0.1, -0.9, -0.2, 0.9, 0.4];
         let scorer = Scorer::new();
-        let visited = |e, stop| scorer.score(&matches, e, 1e-3, Loss::Truncated, stop).visited;
+        let visited = |e, stop| scorer.score(&matches, e, 1e-3, SearchScore::Truncated, stop).visited;
         for stop in [Stop::CannotReach(999.0), Stop::Unlikely(0.9)] {
             assert_eq!((visited(&right, stop), visited(&wrong, stop)), (1000, 64), "{stop:?}");
         }
         // Out of reach only when fewer are left than are missing.
         assert_eq!(visited(&wrong, Stop::CannotReach(500.0)), 512);
         assert_eq!(visited(&wrong, Stop::Unlikely(0.0)), 1000);
-        assert_eq!(scorer.score(&ImageMatches::<f32>::new(), &right, 1.0, Loss::Truncated, Stop::Never), {
-            Score { sum: 0.0, visited: 0 }
-        });
+        assert_eq!(
+            scorer.score(&ImageMatches::<f32>::new(), &right, 1.0, SearchScore::Truncated, Stop::Never),
+            { Score { sum: 0.0, visited: 0 } }
+        );
     }
 
     #[test]
@@ -277,7 +282,7 @@ mod tests {
             let e = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0];
             let mut mask = Vec::new();
             assert_eq!((scorer.inliers(&matches, &e, 0.1, &mut mask), mask), (1, vec![4]));
-            let score = scorer.score(&matches, &e, 0.1, Loss::Marginalised, Stop::Never);
+            let score = scorer.score(&matches, &e, 0.1, SearchScore::Marginalised, Stop::Never);
             assert!((score.sum - 1.0).abs() < 1e-6);
         }
     }

@@ -93,7 +93,7 @@ fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polis
 mod tests {
     use super::*;
     use crate::Correspondence;
-    use crate::lanes::Loss;
+    use crate::lanes::SearchScore;
     use crate::robust::conclude::final_refinement::polish;
     use crate::simulate::{self, FOCAL_LENGTH, Scene, SceneOptions};
     use nalgebra::Vector3;
@@ -121,7 +121,7 @@ mod tests {
     fn refined(scene: &Scene, start: Motion) -> (Vec<u32>, [Motion; 2]) {
         let order = (0..scene.matches.len()).collect();
         let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
-        let mut poses = PoseScorer::new(&observations, Loss::default());
+        let mut poses = PoseScorer::new(&observations, SearchScore::default());
         let polished = polish(&mut poses, start);
         let before = *polished.motion();
         let after = *refine_without_chance(&mut poses, polished).motion();

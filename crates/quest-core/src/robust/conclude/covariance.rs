@@ -158,7 +158,7 @@ fn says_something(covariance: &Matrix6<f64>) -> bool {
 mod tests {
     use super::*;
     use crate::Correspondence;
-    use crate::lanes::Loss as Score;
+    use crate::lanes::SearchScore as Score;
     use crate::robust::conclude::false_alarms;
     use crate::robust::refine::loss::HeavyTailed;
     use crate::robust::search::pose_score::PoseScorer;

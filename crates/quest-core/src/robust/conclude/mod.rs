@@ -4,7 +4,7 @@
 mod alternatives;
 mod chance_inliers;
 mod covariance;
-mod false_alarms;
+pub(crate) mod false_alarms;
 mod final_refinement;
 mod inverse_depth;
 mod length;

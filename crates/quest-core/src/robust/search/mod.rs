@@ -6,28 +6,51 @@
 //! refinement than the refined one would. To refine every one that is better than those before it in its block finds
 //! poses no better.
 
+mod chart;
+mod guide;
+pub(crate) mod hypotheses;
+mod pools;
 pub(crate) mod pose_score;
+mod ranking;
 pub(crate) mod sampling;
 pub(crate) mod search_score;
-pub(crate) mod stopping;
+mod stopping;
+mod useful;
 
-use nalgebra::{Matrix3, Vector3};
+#[cfg(test)]
+mod tests;
 
-use crate::lanes::{BatchSolver, Essentials, Tolerance};
+use nalgebra::Matrix3;
+use rand_chacha::ChaCha8Rng;
+
 use crate::robust::data::observations::Observations;
 use crate::robust::options::{KnownDirection, Options};
 use crate::robust::refine::epipolar::{COARSE, Subset, refine};
 use crate::robust::refine::loss::Biweight;
+use crate::robust::search::chart::chart;
+use crate::robust::search::guide::Guide;
+use crate::robust::search::hypotheses::{Hypotheses, HypothesisSource};
 use crate::robust::search::pose_score::{PoseScorer, Scored, ScoredPose};
-use crate::robust::search::sampling::{MAX_SAMPLE, Sampler};
+use crate::robust::search::sampling::{Exhaustive, MAX_SAMPLE, Sample};
 use crate::robust::search::search_score::{MANY, REACH, Scorer};
-use crate::solver::SolverName;
 use crate::solver::shared::motion::Motion;
-use crate::{Candidates, Correspondence, alignment::best_rotation, solver};
 
 /// Samples that are solved together before their hypotheses are scored: a few at first, where a few may do.
 const FIRST_BLOCK: usize = 8;
 const BLOCK: usize = 32;
+
+/// So many samples are drawn before the matches are ranked, and only where more are needed than ranking takes the time of: a match
+/// is ranked in about a seventh of the time of a sample.
+const UNRANKED: usize = 40;
+const RANKED_PER_SAMPLE: usize = 7;
+
+/// The stopping rule counts matches up to this multiple of the threshold: counted at the threshold itself a pose that is
+/// not refined to the end looks worse than it is, and the search goes on for nothing.
+const SUPPORT: f64 = 1.5;
+
+/// A sample has led to the best pose if one of its hypotheses explains this share of what the pose explains. Not sensitive
+/// between 0.3 and 0.7.
+const LED: f64 = 0.5;
 
 /// A number of samples that is not a multiple of this would leave lanes of the solver unused.
 const LANES: usize = 8;
@@ -45,9 +68,6 @@ const WIDTH: f64 = 4.0;
 /// Costs closer than this are equal: five matches are fitted exactly by every solution. The smaller rotation then comes
 /// first, as among candidates.
 const EQUAL: f64 = 1e-3;
-
-/// Bearings this close after a rotation are turned into each other to rounding.
-const EXACT: f64 = 1e-12;
 
 /// What stops the search.
 #[derive(Clone, Copy)]
@@ -70,14 +90,43 @@ pub(crate) struct SearchResult {
     pub(crate) iterations: usize,
 }
 
+/// What decides which samples are drawn.
+#[derive(Debug)]
+pub(crate) struct Draws {
+    pub(crate) rng: ChaCha8Rng,
+    /// Matches of a sample.
+    pub(crate) size: usize,
+    /// The matches from the best to the worst, where it is known.
+    pub(crate) given: Option<Vec<u32>>,
+}
+
+/// Whether chance explains a pose, its inliers those within the threshold, that was found among so many samples.
+pub(crate) type IsChance<'a> = dyn FnMut(&ScoredPose, usize) -> bool + 'a;
+
+/// Samples that are solved together.
+#[derive(Debug, Default)]
+struct Round {
+    samples: Vec<Sample>,
+    is_from_pool: Vec<bool>,
+    hypotheses: Hypotheses,
+}
+
+impl Round {
+    fn draw(&mut self, guide: &mut Guide, count: usize) {
+        self.samples.clear();
+        self.is_from_pool.clear();
+        for _ in 0..count {
+            let mut sample = [0; MAX_SAMPLE];
+            self.is_from_pool.push(guide.draw(&mut sample));
+            self.samples.push(sample);
+        }
+    }
+}
+
 /// The search for the best pose.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     observations: &'a Observations,
-    solver: SolverName,
-    lanes: BatchSolver,
-    essentials: Essentials,
-    samples: Vec<[usize; MAX_SAMPLE]>,
     direction: Option<KnownDirection>,
     scorer: Scorer<'a>,
     poses: PoseScorer<'a>,
@@ -89,7 +138,10 @@ pub(crate) struct Search<'a> {
     all: Vec<Scored>,
     /// Samples drawn.
     iterations: usize,
-    hypotheses: Vec<Matrix3<f64>>,
+    /// How many poses have been the best, which of them the guide knows, and whether chance explains that one, once it was asked.
+    bests: usize,
+    guided: usize,
+    is_chance: Option<bool>,
 }
 
 impl<'a> Search<'a> {
@@ -98,13 +150,9 @@ impl<'a> Search<'a> {
         options: &Options,
         direction: Option<KnownDirection>,
     ) -> Self {
-        let Options { loss, solver, .. } = *options;
+        let loss = options.loss;
         Self {
             observations,
-            solver,
-            lanes: BatchSolver::new(Tolerance::Loop),
-            essentials: Essentials::new(),
-            samples: Vec::new(),
             direction,
             scorer: Scorer::new(observations, loss),
             poses: PoseScorer::new(observations, loss),
@@ -112,35 +160,47 @@ impl<'a> Search<'a> {
             best: None,
             all: Vec::new(),
             iterations: 0,
-            hypotheses: Vec::new(),
+            bests: 0,
+            guided: 0,
+            is_chance: None,
         }
     }
 
-    /// Draws samples until the limits say that it is enough.
-    pub(crate) fn run(&mut self, sampler: &mut Sampler, limits: &Limits) {
-        // Where there are few samples it costs little to see them all.
-        let min_iterations = if sampler.is_exhaustive() { usize::MAX } else { limits.min_iterations };
-        let limits = &Limits { min_iterations, ..*limits };
-        let mut enough = self.enough(limits);
+    /// Draws samples until the limits say that it is enough: of few matches all that there are, of others as the guide says.
+    /// `given` are the matches from the best to the worst, where that is known; `is_chance` says of a motion whether as many
+    /// samples as were drawn would find one as good among false matches.
+    pub(crate) fn run(
+        &mut self,
+        source: &mut dyn HypothesisSource,
+        draws: Draws,
+        limits: &Limits,
+        is_chance: &mut IsChance,
+    ) {
+        let matches = self.observations.len();
+        if sampling::is_exhaustive(matches) {
+            return self.run_all(source, Exhaustive::new(matches, draws.size), limits);
+        }
+        let mut guide = Guide::new(draws.rng, matches, draws.size, limits.confidence);
+        let mut given = draws.given;
+        // Scores guide from the first sample on.
+        if given.is_some() && !guide.is_too_small() {
+            guide.rank(chart(self.observations), given.take());
+        }
+        let mut round = Round::default();
+        let mut enough = self.enough(&mut guide, limits, is_chance);
         let mut block = FIRST_BLOCK;
         while self.iterations < enough && !(limits.is_cancelled)() {
-            self.samples.clear();
-            let mut sample = [0; MAX_SAMPLE];
             let wanted = (enough - self.iterations).next_multiple_of(LANES).min(block);
-            let left = limits.max_iterations - self.iterations;
-            while self.samples.len() < wanted.min(left) && sampler.draw(&mut sample).is_some() {
-                self.samples.push(sample);
+            round.draw(&mut guide, wanted.min(limits.max_iterations - self.iterations));
+            self.look_at(source, &mut round);
+            self.learn(&mut guide, &round, draws.size);
+            enough = self.enough(&mut guide, limits, is_chance);
+            // What a few samples more would end is not worth an order.
+            let is_long = enough - self.iterations.min(enough) > matches / RANKED_PER_SAMPLE;
+            if self.iterations >= UNRANKED && is_long && !guide.is_ranked() && !guide.is_too_small() {
+                guide.rank(chart(self.observations), None);
+                enough = self.enough(&mut guide, limits, is_chance);
             }
-            if self.samples.is_empty() {
-                break;
-            }
-            self.iterations += self.samples.len();
-            let mut hypotheses = std::mem::take(&mut self.hypotheses);
-            hypotheses.clear();
-            self.solve(&mut hypotheses);
-            self.consider(&hypotheses);
-            self.hypotheses = hypotheses;
-            enough = self.enough(limits);
             block = BLOCK;
         }
     }
@@ -151,55 +211,69 @@ impl<'a> Search<'a> {
         (poses, best.map(|best| SearchResult { best, of_few: all, iterations }))
     }
 
+    /// Looks at every sample: where there are few matches that costs little.
+    fn run_all(&mut self, source: &mut dyn HypothesisSource, mut samples: Exhaustive, limits: &Limits) {
+        let mut round = Round::default();
+        while self.iterations < limits.max_iterations && !(limits.is_cancelled)() {
+            round.samples.clear();
+            round.samples.extend(samples.by_ref().take(BLOCK.min(limits.max_iterations - self.iterations)));
+            if round.samples.is_empty() {
+                break;
+            }
+            self.look_at(source, &mut round);
+        }
+    }
+
+    /// Solves the samples of a round, and considers what they lead to.
+    fn look_at(&mut self, source: &mut dyn HypothesisSource, round: &mut Round) {
+        self.iterations += round.samples.len();
+        round.hypotheses.clear();
+        source.hypotheses(&self.observations.matches, &round.samples, &mut round.hypotheses);
+        self.consider(round.hypotheses.matrices());
+    }
+
+    /// Tells the guide which of the samples of inliers of its best pose led to it.
+    fn learn(&self, guide: &mut Guide, round: &Round, size: usize) {
+        let Some(best) = self.best.filter(|_| self.guided == self.bests) else { return };
+        let count = self.observations.len() as f64;
+        let limit = count - LED * (count - best.cost);
+        for (k, (sample, is_from_pool)) in round.samples.iter().zip(&round.is_from_pool).enumerate() {
+            if guide.tells(&sample[..size], *is_from_pool) {
+                let mut own = round.hypotheses.of(k).iter();
+                let is_useful = own.any(|e| self.scorer.score(e, limit).is_some());
+                guide.learn(is_useful, *is_from_pool);
+            }
+        }
+    }
+
     /// How many samples are enough.
-    fn enough(&self, limits: &Limits) -> usize {
-        let size = self.solver.info().min_matches;
-        let needed = self.best.map_or(f64::INFINITY, |best| {
-            stopping::iterations(best.support, self.observations.len(), size, limits.confidence)
-        });
+    fn enough(&mut self, guide: &mut Guide, limits: &Limits, is_chance: &mut IsChance) -> usize {
+        let Some(best) = self.best else { return limits.max_iterations };
+        if self.guided != self.bests {
+            let pose = self.poses.score(best.motion, SUPPORT * self.poses.threshold());
+            guide.set_best(&pose.inliers);
+            self.poses.recycle(pose);
+            self.guided = self.bests;
+            self.is_chance = None;
+        }
+        let mut needed = guide.needed();
+        if needed <= 0.0 && self.iterations >= limits.min_iterations && self.observations.len() >= MANY {
+            if self.is_chance.is_none() {
+                let pose = self.poses.score(best.motion, self.poses.threshold());
+                self.is_chance = Some(is_chance(&pose, self.iterations));
+                self.poses.recycle(pose);
+            }
+            if self.is_chance == Some(true) {
+                needed = f64::INFINITY;
+            }
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "saturates, and is positive"
         )]
         let needed = needed.ceil() as usize;
-        needed.max(limits.min_iterations).min(limits.max_iterations)
-    }
-
-    /// The essential matrices of the samples.
-    fn solve(&mut self, hypotheses: &mut Vec<Matrix3<f64>>) {
-        let matches = &self.observations.matches;
-        if self.solver == SolverName::Quest {
-            #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
-            let five: Vec<[u32; 5]> =
-                self.samples.iter().map(|sample| std::array::from_fn(|k| sample[k] as u32)).collect();
-            // Every index is one of a match: there is no error.
-            if self.lanes.solve(matches, &five, &mut self.essentials).is_ok() {
-                hypotheses.extend(self.essentials.matrices().iter().map(|e| Matrix3::from_row_slice(e)));
-            }
-            let empty = (0..five.len()).filter(|&k| self.essentials.of(k).is_empty());
-            for sample in empty.map(|k| &five[k]) {
-                hypotheses.extend(turned_in_place(&sample.map(|i| matches[i as usize])));
-            }
-            return;
-        }
-        let size = self.solver.info().min_matches;
-        for sample in &self.samples {
-            let all = sample.map(|i| matches[i]);
-            let mut candidates = Candidates::new();
-            self.solver.solve(solver::Kinds::Exact, &all[..size], &mut candidates);
-            let first = hypotheses.len();
-            for candidate in candidates.iter() {
-                let pose = &candidate.pose;
-                let t = pose.t_21.try_normalize(0.0).unwrap_or_else(Vector3::x);
-                let e = t.cross_matrix() * pose.r_21();
-                // Twisted pairs have one essential matrix, of either sign.
-                let is_new = |other: &Matrix3<f64>| e.dot(other).abs() < 2.0 - 1e-12;
-                if e.iter().all(|x| x.is_finite()) && hypotheses[first..].iter().all(is_new) {
-                    hypotheses.push(e);
-                }
-            }
-        }
+        self.iterations.saturating_add(needed).max(limits.min_iterations).min(limits.max_iterations)
     }
 
     /// Scores hypotheses, and refines the best of them where it is the best so far.
@@ -255,6 +329,7 @@ impl<'a> Search<'a> {
     fn keep(&mut self, scored: Scored) {
         if self.best.is_none_or(|best| scored.cost < best.cost) {
             self.best = Some(scored);
+            self.bests += 1;
         }
     }
 
@@ -287,12 +362,4 @@ impl<'a> Search<'a> {
         self.poses.recycle(best);
         scored
     }
-}
-
-/// The essential matrix of matches that a rotation alone explains to the last digit, with one of the translations that they
-/// leave open.
-fn turned_in_place(matches: &[Correspondence]) -> Option<Matrix3<f64>> {
-    let q_21 = best_rotation(matches);
-    let is_exact = matches.iter().all(|m| (q_21 * m.bearing1()).cross(m.bearing2()).norm() < EXACT);
-    is_exact.then(|| Vector3::<f64>::x().cross_matrix() * q_21.to_rotation_matrix().into_inner())
 }

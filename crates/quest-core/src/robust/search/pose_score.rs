@@ -3,17 +3,13 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::vectors::widest::{Work, widest};
-use crate::lanes::Loss;
+use crate::lanes::SearchScore;
 use crate::robust::data::columns::{POSES, Residuals, is_in_front};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::loss::CAP;
 use crate::robust::search::search_score::{MANY, REACH, cost};
 use crate::solver::shared::essential::decompose;
 use crate::solver::shared::motion::Motion;
-
-/// The stopping rule counts matches up to this multiple of the threshold: counted at the threshold itself a pose that is
-/// not refined to the end looks worse than it is, and the search goes on for nothing.
-const SUPPORT: f64 = 1.5;
 
 /// Matches side by side.
 const WIDTH: usize = 8;
@@ -28,8 +24,6 @@ pub(crate) struct Scored {
     pub(crate) motion: Motion,
     /// The summed loss over all matches; zero is perfect.
     pub(crate) cost: f64,
-    /// How many matches the stopping rule counts as inliers.
-    pub(crate) support: usize,
 }
 
 /// A pose with its score and with what it makes of every match.
@@ -69,14 +63,14 @@ impl ScoredPose {
 #[derive(Debug)]
 pub(crate) struct PoseScorer<'a> {
     pub(crate) observations: &'a Observations,
-    loss: Loss,
+    loss: SearchScore,
     /// The memory of poses that are not needed any more.
     spare: Vec<(Residuals, Vec<u32>)>,
 }
 
 impl<'a> PoseScorer<'a> {
-    pub(crate) fn new(observations: &'a Observations, loss: Loss) -> Self {
-        let loss = if observations.len() < MANY { Loss::Truncated } else { loss };
+    pub(crate) fn new(observations: &'a Observations, loss: SearchScore) -> Self {
+        let loss = if observations.len() < MANY { SearchScore::Truncated } else { loss };
         Self { observations, loss, spare: Vec::new() }
     }
 
@@ -144,9 +138,8 @@ impl<'a> PoseScorer<'a> {
             loss: self.loss,
             inverse_reach: 1.0 / reach,
             judged: limit.max(reach),
-            near: SUPPORT * self.threshold(),
         };
-        let (cost, support) = widest(judging);
+        let cost = widest(judging);
         inliers.resize(residuals.values.len(), 0);
         let mut found = 0;
         for (i, (index, r)) in (0_u32..).zip(&residuals.values).enumerate() {
@@ -155,29 +148,28 @@ impl<'a> PoseScorer<'a> {
             found += usize::from(residuals.is_in_front(i, which) & (r.abs() < limit));
         }
         inliers.truncate(found);
-        ScoredPose { scored: Scored { motion, cost, support }, inliers, residuals, which }
+        ScoredPose { scored: Scored { motion, cost }, inliers, residuals, which }
     }
 }
 
-/// Sums the loss of a pose, and counts its support.
+/// Sums the loss of a pose.
 struct Judging<'a> {
     residuals: &'a Residuals,
     pose: usize,
-    loss: Loss,
+    loss: SearchScore,
     inverse_reach: f64,
     /// Matches behind a camera that are closer than this cost as much as outliers.
     judged: f64,
-    near: f64,
 }
 
 impl Work for Judging<'_> {
-    type Output = (f64, usize);
+    type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> (f64, usize) {
+    fn run(self) -> f64 {
         match self.loss {
-            Loss::Truncated => self.sum(|u| cost(Loss::Truncated, u)),
-            Loss::Marginalised => self.sum(|u| cost(Loss::Marginalised, u)),
+            SearchScore::Truncated => self.sum(|u| cost(SearchScore::Truncated, u)),
+            SearchScore::Marginalised => self.sum(|u| cost(SearchScore::Marginalised, u)),
         }
     }
 }
@@ -185,16 +177,15 @@ impl Work for Judging<'_> {
 impl Judging<'_> {
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
-    fn sum(self, cost: impl Fn(f64) -> f64) -> (f64, usize) {
-        let Self { residuals: of, pose, inverse_reach, judged, near, .. } = self;
-        let (mut sum, mut support) = ([0.0; WIDTH], [0.0; WIDTH]);
+    fn sum(self, cost: impl Fn(f64) -> f64) -> f64 {
+        let Self { residuals: of, pose, inverse_reach, judged, .. } = self;
+        let mut sum = [0.0; WIDTH];
         let (residuals, last_residuals) = of.values.as_chunks::<WIDTH>();
         let (sides, last_sides) = of.sides.as_chunks::<WIDTH>();
         let mut add = |j: usize, r: f64, sides: u32| {
             let (r, is_in_front) = (r.abs(), is_in_front(sides, pose));
             let loss = cost(r * inverse_reach);
             sum[j] += if (r < judged) & !is_in_front { 1.0 } else { loss };
-            support[j] += if is_in_front & (r < near) { 1.0 } else { 0.0 };
         };
         for (residuals, sides) in residuals.iter().zip(sides) {
             for j in 0..WIDTH {
@@ -204,8 +195,6 @@ impl Judging<'_> {
         for (j, (r, sides)) in last_residuals.iter().zip(last_sides).enumerate() {
             add(j, *r, *sides);
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of matches")]
-        let support = support.iter().sum::<f64>() as usize;
-        (sum.iter().sum(), support)
+        sum.iter().sum()
     }
 }

@@ -12,7 +12,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::lanes::{self, BearingMatches, ImageMatches, Loss, Stop};
+use crate::lanes::{self, BearingMatches, ImageMatches, SearchScore, Stop};
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::rows;
 use crate::robust::refine::epipolar::fundamental;
@@ -28,11 +28,11 @@ const LEAST_MEAN: f64 = 0.03;
 pub(crate) const MANY: usize = 10;
 
 /// The loss of a residual in units of the reach.
-pub(crate) fn cost(loss: Loss, u: f64) -> f64 {
+pub(crate) fn cost(loss: SearchScore, u: f64) -> f64 {
     let u = u.abs().min(1.0);
     match loss {
-        Loss::Truncated => u * u,
-        Loss::Marginalised => u * (2.0 - u),
+        SearchScore::Truncated => u * u,
+        SearchScore::Marginalised => u * (2.0 - u),
     }
 }
 
@@ -48,7 +48,7 @@ enum Columns {
 pub(crate) struct Scorer<'a> {
     observations: &'a Observations,
     kernel: lanes::Scorer,
-    loss: Loss,
+    loss: SearchScore,
     columns: Columns,
     /// `T` in the unit of the columns.
     reach: f64,
@@ -56,7 +56,7 @@ pub(crate) struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     /// `threshold` in pixels.
-    pub(crate) fn new(observations: &'a Observations, loss: Loss) -> Self {
+    pub(crate) fn new(observations: &'a Observations, loss: SearchScore) -> Self {
         let reach = REACH * observations.columns.threshold();
         let matches = &observations.matches;
         let kernel = lanes::Scorer::new();
@@ -92,5 +92,26 @@ impl<'a> Scorer<'a> {
         };
         let loss = count - score.sum;
         (score.visited == self.observations.len() && loss < best).then_some(loss)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_and_the_vectors_have_the_same_formula() {
+        // A shift along x takes a point to its line y2 = y1; the residual is half of the difference, in both views.
+        let e = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0];
+        let kernel = lanes::Scorer::new();
+        for kind in SearchScore::CHOICES {
+            for k in 0..=120 {
+                let u = f64::from(k) / 100.0;
+                let mut matches = ImageMatches::<f64>::new();
+                matches.push([0.1, 0.2], [0.4, 0.2 + u * 2.0_f64.sqrt() * 1e-3]);
+                let found = kernel.score(&matches, &e, 1e-3, kind, Stop::Never);
+                assert!((1.0 - found.sum - cost(kind, u)).abs() < 1e-9, "{kind:?} {u}: {found:?}");
+            }
+        }
     }
 }
