@@ -226,6 +226,101 @@ pub fn from_pixels(
     collect(u1, u2, |a, b| Correspondence::from_pixels(camera1, a, camera2, b))
 }
 
+/// The matches that have bearings in both views, where some of the given ones may not: a pixel without a viewing ray, or a
+/// coordinate that is not a number, is no more than an outlier to an estimate.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Usable {
+    /// Those with bearings, in the order given.
+    pub matches: Vec<Correspondence>,
+    /// The others: their places among all, and what is wrong with them.
+    pub invalid: Vec<(usize, MatchError)>,
+}
+
+impl Usable {
+    /// As [`from_image_points`].
+    ///
+    /// # Errors
+    /// [`InputError::LengthMismatch`].
+    pub fn from_image_points(x1: &[[f64; 2]], x2: &[[f64; 2]]) -> Result<Self, InputError> {
+        Self::collect(x1, x2, Correspondence::from_image_points)
+    }
+
+    /// As [`from_bearings`].
+    ///
+    /// # Errors
+    /// [`InputError::LengthMismatch`].
+    pub fn from_bearings(x1: &[[f64; 3]], x2: &[[f64; 3]]) -> Result<Self, InputError> {
+        Self::collect(x1, x2, Correspondence::from_bearings)
+    }
+
+    /// As [`from_pixels`].
+    ///
+    /// # Errors
+    /// [`InputError::LengthMismatch`].
+    pub fn from_pixels(
+        camera1: &Camera,
+        u1: &[[f64; 2]],
+        camera2: &Camera,
+        u2: &[[f64; 2]],
+    ) -> Result<Self, InputError> {
+        Self::collect(u1, u2, |a, b| Correspondence::from_pixels(camera1, a, camera2, b))
+    }
+
+    fn collect<const D: usize>(
+        x1: &[[f64; D]],
+        x2: &[[f64; D]],
+        one: impl Fn([f64; D], [f64; D]) -> Result<Correspondence, MatchError>,
+    ) -> Result<Self, InputError> {
+        if x1.len() != x2.len() {
+            return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
+        }
+        let mut all = Self { matches: Vec::with_capacity(x1.len()), invalid: Vec::new() };
+        for (place, (&a, &b)) in x1.iter().zip(x2).enumerate() {
+            match one(a, b) {
+                Ok(m) => all.matches.push(m),
+                Err(error) => all.invalid.push((place, error)),
+            }
+        }
+        Ok(all)
+    }
+
+    /// How many matches were given.
+    #[must_use]
+    pub fn given(&self) -> usize {
+        self.matches.len() + self.invalid.len()
+    }
+
+    /// The error that the first unusable match is, where there is one.
+    #[must_use]
+    pub fn error(&self) -> Option<InputError> {
+        self.invalid
+            .first()
+            .map(|(index, source)| InputError::Match { index: *index, source: source.clone() })
+    }
+
+    /// Of values, one a match that was given, those of the usable ones.
+    #[must_use]
+    pub fn keep<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        let mut invalid = self.invalid.iter().map(|(place, _)| *place).peekable();
+        let kept = values.iter().enumerate().filter(|(place, _)| invalid.next_if_eq(place).is_none());
+        kept.map(|(_, value)| *value).collect()
+    }
+
+    /// Flags of the usable matches as flags of all that were given: the unusable ones are `false`.
+    #[must_use]
+    pub fn spread(&self, flags: &[bool]) -> Vec<bool> {
+        let mut all = vec![false; self.given()];
+        let mut invalid = self.invalid.iter().map(|(place, _)| *place).peekable();
+        let mut flags = flags.iter();
+        for (place, slot) in all.iter_mut().enumerate() {
+            if invalid.next_if_eq(&place).is_none() {
+                *slot = flags.next().copied().unwrap_or(false);
+            }
+        }
+        all
+    }
+}
+
 fn collect<const D: usize>(
     x1: &[[f64; D]],
     x2: &[[f64; D]],
@@ -236,4 +331,24 @@ fn collect<const D: usize>(
     }
     let pairs = x1.iter().zip(x2).enumerate();
     pairs.map(|(index, (&a, &b))| one(a, b).map_err(|source| InputError::Match { index, source })).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_bearing_is_set_apart() {
+        let x1 = [[0.0, 0.0], [f64::NAN, 0.0], [0.1, 0.0], [1e9, 0.0], [0.2, 0.0]];
+        let x2 = [[0.0; 2]; 5];
+        let usable = Usable::from_image_points(&x1, &x2).unwrap();
+        assert_eq!((usable.matches.len(), usable.given()), (3, 5));
+        assert_eq!(usable.invalid.iter().map(|(place, _)| *place).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(usable.keep(&[0, 1, 2, 3, 4]), [0, 2, 4]);
+        assert_eq!(usable.spread(&[true, false, true]), [true, false, false, false, true]);
+        assert_eq!(usable.error(), from_image_points(&x1, &x2).err());
+        let clean = Usable::from_image_points(&x1[..1], &x2[..1]).unwrap();
+        assert_eq!((clean.error(), clean.spread(&[true])), (None, vec![true]));
+        assert!(Usable::from_image_points(&x1, &x2[..4]).is_err());
+    }
 }

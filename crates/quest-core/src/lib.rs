@@ -132,6 +132,7 @@ pub mod servo;
 pub mod simulate;
 pub mod solver;
 pub mod structure;
+pub mod tangent;
 
 pub use camera::{Camera, CameraError, CameraModel};
 pub use candidate::{Candidate, CandidateKind, Candidates, Degeneracy};

@@ -69,6 +69,28 @@ impl CameraModel {
         }
     }
 
+    /// COLMAP's number of the model, as in its databases and binary files.
+    #[must_use]
+    pub fn colmap_id(self) -> i32 {
+        match self {
+            Self::SimplePinhole => 0,
+            Self::Pinhole => 1,
+            Self::SimpleRadial => 2,
+            Self::Radial => 3,
+            Self::OpenCv => 4,
+            Self::OpenCvFisheye => 5,
+            Self::FullOpenCv => 6,
+            Self::SimpleRadialFisheye => 8,
+            Self::RadialFisheye => 9,
+        }
+    }
+
+    /// The model with this number of COLMAP's, where there is one.
+    #[must_use]
+    pub fn from_colmap_id(id: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|model| model.colmap_id() == id)
+    }
+
     /// The names of the parameters in the order in which [`Camera::new`](super::Camera::new) takes them.
     #[must_use]
     pub fn param_names(self) -> &'static [&'static str] {
