@@ -4,7 +4,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use quest_core::correspondence::Usable;
 use quest_core::lanes::SearchScore;
 use quest_core::robust::{self, Estimate, EstimateError, Options, Priors, ThirdView};
 use quest_core::solver::SolverName;
@@ -30,6 +31,7 @@ Examples:
   quest-cli estimate pair.json --threshold 1.5 --seed 7 --format json
   quest-cli estimate points.csv --threshold 0.001
   quest-cli estimate pairs.jsonl -o results.jsonl
+  quest-cli estimate pairs.jsonl -o results.jsonl --resume     after it was ended
   quest-cli estimate views12.json --third views13.json
 
 Files are those of `quest-cli solve`. With scores the best matches are tried first. The pairs of JSON
@@ -43,13 +45,16 @@ Results:
   the evidence is the median residual of the inliers under each. Of a plane, and where the camera
   hardly moved, there may be a second pose that the noise does not rule out, the runner-up.
   Matches that determine no pose, such as points on a line, are bad input;
-  among JSON Lines their model is degenerate, with a reason and without a pose.
+  among JSON Lines their model is degenerate, with a reason and without a pose. No line stops the others:
+  one that cannot be read gets a record with its reason. With -o each record is kept in FILE.part as it
+  comes, which becomes FILE at the end; --resume goes on after the records that are there.
+  A pixel without a viewing ray is an outlier; invalid_count tells how many there are.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
   The same seed gives the same answer; each line of JSON Lines has random numbers of its own.
 
 Exit status:
-  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
-  2 bad input or arguments.";
+  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the lines),
+  2 bad input or arguments (of JSON Lines: none of the lines could be read).";
 
 /// One pose from matches with outliers.
 #[derive(Args, Debug)]
@@ -83,8 +88,31 @@ pub(crate) struct Arguments {
     /// The matches of view 1 with a third view: of two possible poses the one that agrees with them is taken.
     #[arg(long, value_name = "FILE")]
     third: Option<PathBuf>,
+    /// What to do with a match that has no bearing, such as a pixel without a viewing ray.
+    #[arg(long, value_enum, default_value = "outlier")]
+    invalid: Invalid,
+    /// The number of threads, 0 for all of the machine's: pairs are divided among them.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// The number of the first pair: a part of a larger input has the answers that it has there.
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    first_index: u64,
+    /// Keep the records that an earlier run wrote to -o, and go on with the pair after them.
+    #[arg(long, requires = "output")]
+    resume: bool,
     #[command(flatten)]
     output: OutputOptions,
+}
+
+/// What becomes of a match without a bearing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Invalid {
+    /// It is an outlier.
+    Outlier,
+    /// Its pair has no pose.
+    Pair,
+    /// It is bad input, which ends the run.
+    Raise,
 }
 
 /// The result of one pair.
@@ -92,8 +120,8 @@ struct Estimated {
     heading: String,
     record: EstimateRecord,
     focal_length: Option<f64>,
-    /// Why there is no pose, with the place.
-    refusal: Option<String>,
+    /// Why there is no pose.
+    refusal: Option<Refusal>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -102,27 +130,83 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if arguments.third.is_some() && is_lines {
         return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
     }
-    let mut writer = Writer::open(&arguments.output, is_lines)?;
+    let (mut writer, there) = Writer::open_long(&arguments.output, is_lines, arguments.resume)?;
     let progress = Progress::new("pairs", None, arguments.output.quiet);
-    let mut outcome = Outcome::Answer;
-    let numbered = (0..).map_while(|index| Some((index, pairs.next().transpose()?)));
-    in_order(
-        numbered,
-        |(index, pair): (u64, Result<Pair, ReadError>)| one_pair(arguments, index, &pair?, is_lines),
+    let mut tally = Tally { are_there: there > 0, ..Tally::default() };
+    let numbered = (arguments.first_index..).map_while(|index| Some((index, pairs.next().transpose()?)));
+    let done = in_order(
+        arguments.threads,
+        numbered.skip(there),
+        |(index, pair): (u64, Result<Pair, ReadError>)| match pair {
+            Ok(pair) => one_pair(arguments, index, &pair, is_lines),
+            Err(error) if is_lines && error.place.line.is_some() => Ok(Estimated::unreadable(error)),
+            Err(error) => Err(error.into()),
+        },
         |estimated: Result<Estimated, Failure>| {
             let Estimated { heading, record, focal_length, refusal } = estimated?;
             writer.write(&heading, record, focal_length)?;
-            if let Some(refusal) = refusal {
-                words::say("no pose", &refusal);
-                outcome = Outcome::NoPose;
-            }
+            tally.count(refusal);
             progress.add(1);
             Ok::<_, Failure>(())
         },
-    )?;
+    );
     progress.finish();
-    writer.finish(is_lines)?;
-    Ok(outcome)
+    // What was answered is kept, whatever ended the run; of one pair there is nothing.
+    if is_lines || done.is_ok() {
+        writer.finish(is_lines)?;
+    }
+    done?;
+    tally.outcome()
+}
+
+/// Why there is no pose, with the place.
+enum Refusal {
+    NoPose(String),
+    Unreadable(ReadError),
+}
+
+/// What the lines of a file came to.
+#[derive(Default)]
+struct Tally {
+    /// Whether any pair could be read, or had been.
+    are_there: bool,
+    is_without_pose: bool,
+    /// The first line that could not be read.
+    unreadable: Option<ReadError>,
+}
+
+impl Tally {
+    /// Tells of a pair without a pose, and counts it.
+    fn count(&mut self, refusal: Option<Refusal>) {
+        self.is_without_pose |= refusal.is_some();
+        match refusal {
+            Some(Refusal::Unreadable(error)) => {
+                words::say("no pose", &error.to_string());
+                self.unreadable.get_or_insert(error);
+                return;
+            }
+            Some(Refusal::NoPose(reason)) => words::say("no pose", &reason),
+            None => {}
+        }
+        self.are_there = true;
+    }
+
+    fn outcome(self) -> Result<Outcome, Failure> {
+        match self.unreadable {
+            Some(error) if !self.are_there => Err(error.into()),
+            _ if self.is_without_pose => Ok(Outcome::NoPose),
+            _ => Ok(Outcome::Answer),
+        }
+    }
+}
+
+impl Estimated {
+    /// A line that is no pair.
+    fn unreadable(error: ReadError) -> Self {
+        let heading = words::one_line(&format!("{}: no pose", error.place));
+        let record = EstimateRecord::unanswered(None, error.to_string());
+        Self { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)) }
+    }
 }
 
 impl Arguments {
@@ -152,36 +236,51 @@ impl Arguments {
 }
 
 fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> Result<Estimated, Failure> {
-    let matches = pair.correspondences()?;
+    let usable = pair.usable();
     let options = arguments.options(pair, index)?;
     let third = arguments.third.as_deref().map(|file| third(arguments, file)).transpose()?;
     let start = Instant::now();
-    let result = match &third {
-        None => {
-            let priors = Priors { scores: pair.scores.as_deref(), ..Priors::default() };
-            robust::estimate_with(&matches, &options, &priors).map(|estimate| (estimate, None))
-        }
-        Some((others, others_options)) => {
-            let found = robust::estimate_with_third_view(&matches, &options, others, others_options);
-            found.map(|found| (found.estimate_21.clone(), Some(found)))
-        }
+    let result = match (usable.error(), arguments.invalid) {
+        (Some(error), Invalid::Raise) => return Err(pair.refuse(error).into()),
+        (Some(error), Invalid::Pair) => Err(error.into()),
+        _ => search(pair, &usable, &options, third.as_ref()),
     };
     let elapsed_ms = start.elapsed().as_secs_f64() * 1e3;
     let (record, reason) = match result {
         Ok((estimate, third)) => (found(pair, &estimate, third.as_ref(), elapsed_ms), None),
         Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
-        // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
-        Err(EstimateError::Input(error)) if !(is_lines && matches!(error, InputError::Degenerate(_))) => {
+        // One pair of a file that has no pose is no reason to stop; a file that holds nothing else is bad input.
+        Err(EstimateError::Input(error)) if !(is_lines || matches!(error, InputError::Match { .. })) => {
             return Err(pair.refuse(error).into());
         }
         Err(error) => {
             (EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms), Some(error.to_string()))
         }
     };
+    let record = EstimateRecord { invalid_count: usable.invalid.len(), ..record };
     let name = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
-    let heading = words::one_line(&format!("{name}: {} matches{}", matches.len(), summary(&record)));
-    let refusal = reason.map(|reason| format!("{}: {reason}", pair.place));
+    let heading = words::one_line(&format!("{name}: {} matches{}", pair.matches.len(), summary(&record)));
+    let refusal = reason.map(|reason| Refusal::NoPose(format!("{}: {reason}", pair.place)));
     Ok(Estimated { heading, record, focal_length: pair.focal_length(), refusal })
+}
+
+/// The estimate of the usable matches of a pair, its inliers among all of them.
+fn search(
+    pair: &Pair,
+    usable: &Usable,
+    options: &Options,
+    third: Option<&(Vec<Correspondence>, Options)>,
+) -> Result<(Estimate, Option<ThirdView>), EstimateError> {
+    let Some((others, others_options)) = third else {
+        let scores = pair.scores.as_ref().map(|scores| usable.keep(scores));
+        let priors = Priors { scores: scores.as_deref(), ..Priors::default() };
+        let mut estimate = robust::estimate_with(&usable.matches, options, &priors)?;
+        estimate.inliers = usable.spread(&estimate.inliers);
+        return Ok((estimate, None));
+    };
+    let mut found = robust::estimate_with_third_view(&usable.matches, options, others, others_options)?;
+    found.estimate_21.inliers = usable.spread(&found.estimate_21.inliers);
+    Ok((found.estimate_21.clone(), Some(found)))
 }
 
 /// The matches of view 1 with a third view.
@@ -190,7 +289,7 @@ fn third(arguments: &Arguments, file: &Path) -> Result<(Vec<Correspondence>, Opt
         return Err(Failure::Arguments(format!("{}: found no pair, expected one", file.display())));
     };
     // Random numbers of its own.
-    Ok((pair.correspondences()?, arguments.options(&pair, 1)?))
+    Ok((pair.usable().matches, arguments.options(&pair, 1)?))
 }
 
 fn found(pair: &Pair, estimate: &Estimate, third: Option<&ThirdView>, elapsed_ms: f64) -> EstimateRecord {
@@ -202,7 +301,13 @@ fn found(pair: &Pair, estimate: &Estimate, third: Option<&ThirdView>, elapsed_ms
 fn summary(record: &EstimateRecord) -> String {
     record.found.as_ref().map_or_else(
         || ", no pose".to_owned(),
-        |found| format!(", {} inliers, {} iterations", found.inlier_count, found.iterations),
+        |found| {
+            let invalid = match record.invalid_count {
+                0 => String::new(),
+                count => format!(", {count} without a bearing"),
+            };
+            format!(", {} inliers, {} iterations{invalid}", found.inlier_count, found.iterations)
+        },
     )
 }
 

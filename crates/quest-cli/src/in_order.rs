@@ -9,13 +9,15 @@ use std::thread;
 const AHEAD: usize = 16;
 
 /// Hands `work` of every item to `sink`, in order and as soon as it is there; an error of the sink ends it. Items are taken
-/// on the thread of the caller, no more of them than a few for each core ahead of the sink.
+/// on the thread of the caller, no more of them than a few for each thread ahead of the sink. Zero threads are as many as there are
+/// cores.
 pub(crate) fn in_order<T: Send, R: Send, E: Send>(
+    threads: usize,
     items: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Sync,
     mut sink: impl FnMut(R) -> Result<(), E> + Send,
 ) -> Result<(), E> {
-    let threads = thread::available_parallelism().map_or(1, usize::from);
+    let threads = if threads == 0 { thread::available_parallelism().map_or(1, usize::from) } else { threads };
     let (to_workers, jobs) = mpsc::sync_channel::<(T, SyncSender<R>)>(threads);
     let (to_sink, results) = mpsc::sync_channel::<Receiver<R>>(AHEAD * threads);
     let jobs = Mutex::new(jobs);
@@ -54,7 +56,7 @@ mod tests {
             let spins = if i.is_multiple_of(7) { 20_000 } else { 1 };
             (0..spins).fold(i, |x, _| std::hint::black_box(x))
         };
-        let done: Result<(), ()> = in_order(0..1_000, slow_first, |i| {
+        let done: Result<(), ()> = in_order(0, 0..1_000, slow_first, |i| {
             all.push(i);
             Ok(())
         });
@@ -65,6 +67,7 @@ mod tests {
     fn an_error_of_the_sink_ends_it() {
         let mut seen = 0;
         let done = in_order(
+            3,
             0..,
             |i: u64| i,
             |i| {

@@ -3,6 +3,8 @@
 //! One file a subcommand: arguments, one call, a table. Data goes to standard output, words to standard error.
 
 mod candidate_table;
+#[cfg(feature = "colmap")]
+mod colmap;
 mod estimate;
 mod estimate_table;
 mod in_order;
@@ -31,6 +33,7 @@ Examples:
   quest-cli estimate examples/tumfr3_98072_98172.json   one pose, from matches with outliers
   quest-cli simulate --figure 4 --plot errors.html      the experiments of the paper
   quest-cli servo --scenario robot --noise 0.5          a robot that drives to where an image was taken
+  quest-cli colmap verify database.db                   the image pairs of a COLMAP database
   quest-cli solvers                                     the solvers to choose from
 
 Exit status: 0 an answer, 1 no pose could be found, 2 bad input or arguments.";
@@ -50,6 +53,8 @@ enum Command {
     Simulate(Box<simulate::Arguments>),
     Servo(Box<servo::Arguments>),
     View(Box<view::Arguments>),
+    #[cfg(feature = "colmap")]
+    Colmap(Box<colmap::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -70,6 +75,9 @@ enum Failure {
     Scene(#[from] quest_core::simulate::SceneError),
     #[error(transparent)]
     Plot(#[from] quest_plot::PlotError),
+    #[cfg(feature = "colmap")]
+    #[error(transparent)]
+    Colmap(#[from] quest_colmap::ColmapError),
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -82,6 +90,8 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Servo(arguments) => servo::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
+        #[cfg(feature = "colmap")]
+        Command::Colmap(arguments) => colmap::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

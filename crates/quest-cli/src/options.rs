@@ -75,6 +75,11 @@ impl OutputOptions {
     pub(crate) fn open(&self) -> Result<Output, WriteError> {
         Output::open(self.output.as_deref().map(Path::new))
     }
+
+    /// The target of a long run, found writable, and how many lines of an earlier run it holds.
+    pub(crate) fn open_growing(&self, resume: bool) -> Result<(Output, usize), WriteError> {
+        Output::growing(self.output.as_deref().map(Path::new), resume)
+    }
 }
 
 /// `MODEL,width,height,params…` as a camera.

@@ -22,7 +22,7 @@ impl Progress {
     pub(crate) fn new(noun: &'static str, total: Option<u64>, quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(total, ProgressDrawTarget::hidden());
         let template = match total {
-            Some(_) => "{prefix} {wide_bar} {pos}/{len} {msg}, {eta} left",
+            Some(_) => "{prefix} {wide_bar} {pos}/{len} {msg}, {per_sec}, {eta} left",
             None => "{spinner} {pos} {msg} in {elapsed}, {per_sec}",
         };
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -36,6 +36,12 @@ impl Progress {
     /// What is being done, ahead of the bar.
     pub(crate) fn begin(&self, part: String) {
         self.bar.set_prefix(part);
+    }
+
+    /// The total, where it is known late.
+    #[cfg_attr(not(feature = "colmap"), expect(dead_code, reason = "databases alone know their total late"))]
+    pub(crate) fn set_total(&self, total: u64) {
+        self.bar.set_length(total);
     }
 
     /// So many more are done.

@@ -6,6 +6,7 @@ use quest_io::{Output, WriteError};
 use serde::Serialize;
 
 use crate::{
+    Failure,
     options::{Format, OutputOptions},
     rows,
 };
@@ -33,6 +34,25 @@ impl<R: Record> Writer<R> {
     pub(crate) fn open(options: &OutputOptions, is_lines: bool) -> Result<Self, WriteError> {
         let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
         Ok(Self { output: options.open()?, format, pairs: 0, kept: Vec::new() })
+    }
+
+    /// As [`open`](Self::open), for a long run: lines of JSON go to a file as they come. With `resume` the lines of an earlier run
+    /// stay; how many there are is returned.
+    pub(crate) fn open_long(
+        options: &OutputOptions,
+        is_lines: bool,
+        resume: bool,
+    ) -> Result<(Self, usize), Failure> {
+        let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
+        if format != Format::Jsonl || !is_lines {
+            if resume {
+                let message = "found --resume, expected JSON Lines as input and as output with it".to_owned();
+                return Err(Failure::Arguments(message));
+            }
+            return Ok((Self::open(options, is_lines)?, 0));
+        }
+        let (output, pairs) = options.open_growing(resume)?;
+        Ok((Self { output, format, pairs, kept: Vec::new() }, pairs))
     }
 
     pub(crate) fn write(

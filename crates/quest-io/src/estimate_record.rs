@@ -19,6 +19,9 @@ pub struct EstimateRecord {
     /// Why there is no pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// How many matches have no bearing, such as pixels without a viewing ray, and were taken for outliers.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub invalid_count: usize,
     /// What was found.
     #[serde(flatten)]
     pub found: Option<FoundRecord>,
@@ -33,6 +36,11 @@ pub struct EstimateRecord {
     /// The angle in degrees to the true direction of translation, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub translation_error_deg: Option<f64>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// What an estimate found. Fields as those of [`Estimate`].
@@ -145,6 +153,7 @@ impl EstimateRecord {
             name,
             model: Some(estimate.model.name()),
             reason: None,
+            invalid_count: 0,
             found: Some(FoundRecord::new(estimate, truth)),
             third_view: None,
             elapsed_ms,
@@ -157,13 +166,21 @@ impl EstimateRecord {
     #[must_use]
     pub fn no_pose(name: Option<String>, error: &EstimateError, elapsed_ms: f64) -> Self {
         let is_degenerate = matches!(error, EstimateError::Input(InputError::Degenerate(_)));
+        let model = is_degenerate.then_some("degenerate");
+        Self { model, elapsed_ms, ..Self::unanswered(name, error.to_string()) }
+    }
+
+    /// The record of a pair that could not be read, or not be used, and why.
+    #[must_use]
+    pub fn unanswered(name: Option<String>, reason: String) -> Self {
         Self {
             name,
-            model: is_degenerate.then_some("degenerate"),
-            reason: Some(error.to_string()),
+            model: None,
+            reason: Some(reason),
+            invalid_count: 0,
             found: None,
             third_view: None,
-            elapsed_ms,
+            elapsed_ms: 0.0,
             rotation_error_deg: None,
             translation_error_deg: None,
         }

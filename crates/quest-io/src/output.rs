@@ -43,6 +43,8 @@ enum Target {
     Special(File),
     /// A file that is written under another name in the same directory, then renamed.
     File { path: PathBuf, text: Vec<u8> },
+    /// Written into `part` as it comes, which is then renamed.
+    Growing { path: PathBuf, part: PathBuf, file: File },
 }
 
 impl Output {
@@ -63,6 +65,30 @@ impl Output {
         }
     }
 
+    /// As [`Output::open`], for runs that may be ended: what is written to a file goes at once into another one beside it, with
+    /// `.part` at the end of its name, which takes the file's place in [`Output::finish`]. With `resume` it begins with the whole
+    /// lines of an earlier run: those of the part where there is one, else those of the file. Returns also how many there are.
+    ///
+    /// # Errors
+    /// A path that cannot be written to, or lines that cannot be read.
+    pub fn growing(path: Option<&Path>, resume: bool) -> Result<(Self, usize), WriteError> {
+        let output = Self::open(path)?;
+        let Target::File { path, .. } = output.target else { return Ok((output, 0)) };
+        let mut part = path.clone().into_os_string();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let grow = || {
+            let kept = if resume { lines(&part, &path)? } else { Vec::new() };
+            let mut file = new_file(directory(&path))?;
+            file.write_all(&kept)?;
+            let file = file.persist(&part)?;
+            // Every one of the lines ends.
+            Ok((file, kept.split(|&byte| byte == b'\n').count() - 1))
+        };
+        let (file, count) = grow().map_err(|source| WriteError { target: output.name.clone(), source })?;
+        Ok((Self { name: output.name, target: Target::Growing { path, part, file } }, count))
+    }
+
     /// Runs `write` on the target.
     ///
     /// # Errors
@@ -70,7 +96,7 @@ impl Output {
     pub fn write(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
         let result = match &mut self.target {
             Target::Stdout => write(&mut io::stdout().lock()),
-            Target::Special(file) => write(file),
+            Target::Special(file) | Target::Growing { file, .. } => write(file),
             Target::File { text, .. } => write(text),
         };
         result.map_err(|source| WriteError { target: self.name.clone(), source })
@@ -85,6 +111,7 @@ impl Output {
             Target::Stdout => io::stdout().flush(),
             Target::Special(mut file) => file.flush(),
             Target::File { path, text } => replace(&path, &text),
+            Target::Growing { path, part, file } => grown(&path, &part, &file),
         };
         result.map_err(|source| WriteError { target: self.name, source })
     }
@@ -113,6 +140,31 @@ impl Target {
 
 fn directory(path: &Path) -> &Path {
     path.parent().filter(|d| !d.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The whole lines of the first of these files that is there; none where neither is.
+fn lines(part: &Path, path: &Path) -> io::Result<Vec<u8>> {
+    for file in [part, path] {
+        match fs::read(file) {
+            Ok(mut text) => {
+                // A run that was killed may have ended within a line.
+                let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+                text.truncate(whole);
+                return Ok(text);
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn grown(path: &Path, part: &Path, file: &File) -> io::Result<()> {
+    if let Ok(existing) = fs::metadata(path) {
+        file.set_permissions(existing.permissions())?;
+    }
+    file.sync_all()?;
+    fs::rename(part, path)
 }
 
 fn replace(path: &Path, text: &[u8]) -> io::Result<()> {

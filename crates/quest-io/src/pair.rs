@@ -1,7 +1,8 @@
 //! An image pair: cameras, matches, and the other data that a file has about them.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quest_core::{Camera, Correspondence, InputError, RelativePose, correspondence};
+use quest_core::correspondence::{self, Usable};
+use quest_core::{Camera, Correspondence, InputError, RelativePose};
 
 use crate::error::{Place, ReadError};
 
@@ -46,6 +47,19 @@ impl Pair {
             None => correspondence::from_image_points(&x1, &x2),
         };
         matches.map_err(|error| self.refuse(error))
+    }
+
+    /// The matches that have bearings, and which do not: to an estimate they are outliers.
+    #[must_use]
+    pub fn usable(&self) -> Usable {
+        let view = |k| self.matches.iter().map(|m| [m[k], m[k + 1]]).collect::<Vec<_>>();
+        let (x1, x2) = (view(0), view(2));
+        let usable = match &self.cameras {
+            Some([camera1, camera2]) => Usable::from_pixels(camera1, &x1, camera2, &x2),
+            None => Usable::from_image_points(&x1, &x2),
+        };
+        // The two views have as many points, which is all that could be refused.
+        usable.unwrap_or_default()
     }
 
     /// The error that the matches of this pair are unusable, with their place.

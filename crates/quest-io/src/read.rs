@@ -39,7 +39,8 @@ impl Format {
     }
 }
 
-/// The pairs of a file, one after the other; after an error there are no more.
+/// The pairs of a file, one after the other. A line of JSON Lines that is no pair is an error with its line, after which the next
+/// line follows; after any other error there are no more.
 pub struct Pairs {
     place: Place,
     format: Format,
@@ -175,7 +176,13 @@ impl Iterator for Pairs {
             Format::Json | Format::Csv => Some(self.whole()),
         };
         self.found_any = true;
-        self.done = self.format != Format::JsonLines || !matches!(pair, Some(Ok(_)));
+        let is_line = |error: &ReadError| error.place.line.is_some();
+        self.done = self.format != Format::JsonLines
+            || match &pair {
+                Some(Ok(_)) => false,
+                Some(Err(error)) => !is_line(error),
+                None => true,
+            };
         pair
     }
 }

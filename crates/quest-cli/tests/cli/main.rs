@@ -1,5 +1,5 @@
 //! `quest-cli` as its users meet it: arguments and files in, exit status, standard output and error out.
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
 mod bad_input;
 mod candidates;

@@ -1,0 +1,119 @@
+//! `quest-cli colmap export`: matches and poses of a database for other programs.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use quest_colmap::{
+    ColmapError, Database, Exported, PairId, VerifyOptions, export_matches, export_poses, read_pairs,
+    write_g2o,
+};
+use quest_io::Output;
+
+use super::Shown;
+use crate::{Failure, Outcome, words};
+
+const EXAMPLES: &str = "\
+Examples:
+  quest-cli colmap export database.db -o pairs.jsonl
+  quest-cli colmap export database.db --what poses -o poses.g2o
+  quest-cli colmap export database.db | quest-cli estimate - -o poses.jsonl
+
+Matches are JSON Lines as `quest-cli estimate` reads them, one pair a line, named by its two images.
+Poses are edges of a graph in g2o's form: every pair is estimated with the threshold, and the edge holds
+the pose of the second camera in the frame of the first and its information, the inverse of the
+covariance, of (x, y, z, qx, qy, qz). Each translation has the scale of its own pair, in which the mean
+depth is one.";
+
+/// Write the matches of a COLMAP database as JSON Lines, or its poses with covariances as a graph.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    /// The database.
+    database: PathBuf,
+    /// What is written.
+    #[arg(long, value_enum, default_value = "matches")]
+    what: What,
+    /// Only the pairs of this file: the names of two images a line.
+    #[arg(long, value_name = "FILE")]
+    pairs: Option<PathBuf>,
+    /// Matches with a Sampson error below this are inliers, in pixels: of poses.
+    #[arg(long, value_name = "PX", allow_negative_numbers = true, default_value_t = VerifyOptions::default().threshold)]
+    threshold: f64,
+    /// Pairs with fewer inliers have no pose.
+    #[arg(long, value_name = "N", default_value_t = VerifyOptions::default().min_inliers)]
+    min_inliers: usize,
+    /// The seed of the samples.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+    /// Write to this file, whole or not at all.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Say nothing on standard error but errors.
+    #[arg(long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum What {
+    /// JSON Lines.
+    Matches,
+    /// A graph in g2o's form.
+    Poses,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let mut output = Output::open(arguments.output.as_deref())?;
+    let database = Database::open(&arguments.database)?;
+    let pairs = arguments.pairs(&database)?;
+    let shown = Shown::new(arguments.quiet);
+    let exported = match arguments.what {
+        What::Matches => {
+            let mut done = Ok(Exported::default());
+            let written = output.write(|writer| {
+                done = export_matches(&database, &pairs, writer, &shown);
+                match std::mem::replace(&mut done, Ok(Exported::default())) {
+                    Err(ColmapError::Io { source, .. }) => Err(source),
+                    other => {
+                        done = other;
+                        Ok(())
+                    }
+                }
+            });
+            written?;
+            done?
+        }
+        What::Poses => {
+            let options = VerifyOptions {
+                threshold: arguments.threshold,
+                min_inliers: arguments.min_inliers,
+                seed: arguments.seed,
+                ..VerifyOptions::default()
+            };
+            let (edges, mut exported) = export_poses(&database, &pairs, &options, &shown)?;
+            let mut left = Vec::new();
+            output.write(|writer| {
+                left = write_g2o(&edges, writer)?;
+                Ok(())
+            })?;
+            exported.written -= left.len();
+            let reason = "the covariance has no inverse".to_owned();
+            exported.left.extend(left.into_iter().map(|names| (names.join(" "), reason.clone())));
+            exported
+        }
+    };
+    shown.progress.finish();
+    output.finish()?;
+    for (name, reason) in exported.left.iter().filter(|_| !arguments.quiet) {
+        words::say("left out", &format!("{name}: {reason}"));
+    }
+    Ok(if exported.written == 0 { Outcome::NoPose } else { Outcome::Answer })
+}
+
+impl Arguments {
+    fn pairs(&self, database: &Database) -> Result<Vec<PairId>, Failure> {
+        Ok(match &self.pairs {
+            Some(file) => database.keys_of(&read_pairs(file)?)?,
+            None => database.matched_pairs()?.into_iter().collect(),
+        })
+    }
+}

@@ -1,0 +1,52 @@
+//! `quest-cli colmap`: image pairs of COLMAP databases.
+
+mod export;
+mod verify;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use clap::{Args, Subcommand};
+use quest_colmap::Watch;
+
+use crate::{Failure, Outcome, progress::Progress};
+
+/// Verify and export the image pairs of COLMAP databases.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    Verify(Box<verify::Arguments>),
+    Export(Box<export::Arguments>),
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    match &arguments.command {
+        Command::Verify(arguments) => verify::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
+    }
+}
+
+/// Shows how far a run is.
+struct Shown {
+    progress: Progress,
+    /// Pairs that have been shown.
+    done: AtomicUsize,
+}
+
+impl Shown {
+    fn new(quiet: bool) -> Self {
+        Self { progress: Progress::new("pairs", Some(0), quiet), done: AtomicUsize::new(0) }
+    }
+}
+
+impl Watch for Shown {
+    fn progress(&self, done: usize, total: usize) {
+        self.progress.set_total(total as u64);
+        let before = self.done.swap(done, Ordering::Relaxed);
+        self.progress.add(done.saturating_sub(before) as u64);
+    }
+}
