@@ -7,7 +7,7 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::errors::{NotFinite, ShapeMismatch};
+use crate::errors::{NotFinite, QuestError, ShapeMismatch};
 
 /// Points as they came: two numbers a row, or three.
 pub(crate) enum Points {
@@ -18,6 +18,13 @@ pub(crate) enum Points {
 }
 
 impl Points {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Image(rows) => rows.len(),
+            Self::Bearings(rows) => rows.len(),
+        }
+    }
+
     pub(crate) fn columns(&self) -> usize {
         match self {
             Self::Image(_) => 2,
@@ -73,6 +80,29 @@ pub(crate) fn vector(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>>
     }
 }
 
+/// The numbers of the argument `name`, of any shape.
+pub(crate) fn flat(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    Ok(Real::new(name, given, "real numbers")?.numbers()?.as_slice()?.to_vec())
+}
+
+/// The whole numbers of the argument `name`, of shape `(N,)`, none of them negative.
+pub(crate) fn keys(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
+    let expected = "whole numbers of shape (N,), none of them negative";
+    let array = Real::new(name, given, expected)?;
+    let [_] = *array.array.shape() else { return Err(array.mismatch()) };
+    let numpy = given.py().import("numpy")?;
+    let is_whole = b"iu".contains(&array.array.dtype().kind()) || array.array.len() == 0;
+    let is_negative = || {
+        let below = numpy.call_method1("less", (&array.array, 0))?;
+        numpy.call_method1("any", (below,))?.is_truthy()
+    };
+    if !is_whole || is_negative()? {
+        return Err(QuestError::new_err(format!("{name} holds other numbers, expected {expected}")));
+    }
+    let keys = numpy.call_method1("require", (&array.array, "u8", ["C", "A"]))?;
+    Ok(keys.cast_into::<PyArrayDyn<u64>>()?.try_readonly()?.as_slice()?.to_vec())
+}
+
 /// A new array of shape `(N, D)`.
 pub(crate) fn to_numpy<const D: usize>(py: Python<'_>, rows: Vec<[f64; D]>) -> Bound<'_, PyArray2<f64>> {
     Array2::from(rows).into_pyarray(py)
@@ -115,7 +145,13 @@ impl<'a, 'py> Real<'a, 'py> {
             }
             ShapeMismatch::new_err(format!("{name}: {}, expected {expected}", error.value(py)))
         })?;
-        Ok(array.cast_into()?)
+        let array: Bound<'py, PyUntypedArray> = array.cast_into()?;
+        if array.dtype().kind() != b'O' {
+            return Ok(array);
+        }
+        // Columns of lists, of Arrow and of data frames, which NumPy sees as objects.
+        let dense = py.import("quest_pose._columns")?.call_method1("dense", (given,))?;
+        if dense.is_none() { Ok(array) } else { Ok(dense.cast_into()?) }
     }
 
     fn rows<const D: usize>(&self) -> PyResult<Vec<[f64; D]>> {

@@ -1,13 +1,16 @@
 //! `Camera`, and what else may stand where a camera is expected.
 
+use std::hash::{Hash, Hasher};
+
 use nalgebra::Matrix3;
-use numpy::PyArray2;
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use quest_core::CameraError;
 
 use crate::arrays;
-use crate::errors::{self, BadCamera};
+use crate::errors::{self, BadCamera, QuestError};
+use crate::foreign_camera;
 
 /// A calibrated camera, with COLMAP's models and parameters.
 ///
@@ -27,19 +30,31 @@ use crate::errors::{self, BadCamera};
 /// ------
 /// BadCamera
 ///     For an unknown model, a wrong number of parameters, or impossible ones.
-#[pyclass(frozen, eq, module = "quest_pose")]
+#[pyclass(frozen, eq, hash, module = "quest_pose")]
 #[derive(Debug, PartialEq)]
 pub(crate) struct Camera(quest_core::Camera);
 
-/// The camera of the argument `name`: a `Camera`, or a 3 x 3 matrix K.
-pub(crate) fn from_argument(name: &str, given: &Bound<'_, PyAny>) -> PyResult<quest_core::Camera> {
-    match given.cast::<Camera>() {
-        Ok(camera) => Ok(camera.get().0),
-        Err(_) => from_k(name, given),
+impl Hash for Camera {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.0.model().hash(state);
+        self.0.size().hash(state);
+        // Zeros of either sign are equal.
+        self.0.params().iter().for_each(|x| (x + 0.0).to_bits().hash(state));
     }
 }
 
-fn from_k(name: &str, k: &Bound<'_, PyAny>) -> PyResult<quest_core::Camera> {
+/// The camera of the argument `name`: a `Camera`, a 3 x 3 matrix K, or what other libraries call a camera.
+pub(crate) fn from_argument(name: &str, given: &Bound<'_, PyAny>) -> PyResult<quest_core::Camera> {
+    if let Ok(camera) = given.cast::<Camera>() {
+        return Ok(camera.get().0);
+    }
+    match foreign_camera::read(name, given)? {
+        Some(camera) => Ok(camera),
+        None => from_k(name, given),
+    }
+}
+
+pub(crate) fn from_k(name: &str, k: &Bound<'_, PyAny>) -> PyResult<quest_core::Camera> {
     let rows = arrays::matrix3(name, k)?;
     // nalgebra keeps columns, NumPy rows.
     let k = Matrix3::from(rows).transpose();
@@ -97,6 +112,42 @@ impl Camera {
         from_k("k", k).map(Self)
     }
 
+    /// The camera that OpenCV's calibration describes.
+    ///
+    /// Parameters
+    /// ----------
+    /// k : array_like of shape (3, 3)
+    ///     The camera matrix.
+    /// dist : array_like of shape (0,), (4,), (5,), (8,), (12,) or (14,)
+    ///     The distortion coefficients in OpenCV's order; from the ninth on, thin prism and tilt, they have to be zero. Four,
+    ///     for a fisheye camera.
+    /// fisheye : bool
+    ///     Whether ``dist`` is that of ``cv2.fisheye``.
+    /// size : (int, int), optional
+    ///     Width and height of the image.
+    ///
+    /// Returns
+    /// -------
+    /// Camera
+    ///     ``"PINHOLE"``, ``"OPENCV"``, ``"FULL_OPENCV"`` or ``"OPENCV_FISHEYE"``.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeMismatch, BadCamera
+    ///     For an array of another shape, and for an impossible matrix or number of coefficients.
+    #[staticmethod]
+    #[pyo3(signature = (k, dist=None, *, fisheye=false, size=None))]
+    fn from_opencv(
+        k: &Bound<'_, PyAny>,
+        dist: Option<&Bound<'_, PyAny>>,
+        fisheye: bool,
+        size: Option<(u32, u32)>,
+    ) -> PyResult<Self> {
+        let k = from_k("k", k)?;
+        let dist = dist.map_or_else(|| Ok(Vec::new()), |dist| foreign_camera::flat("dist", dist))?;
+        foreign_camera::opencv("camera", &k, &dist, fisheye, size).map(Self)
+    }
+
     /// str : COLMAP's name of the model.
     #[getter]
     fn model(&self) -> &'static str {
@@ -128,6 +179,9 @@ impl Camera {
     /// pixels : array_like of shape (N, 2)
     ///     Pixels (u, v).
     ///
+    /// invalid : {"raise", "nan"}
+    ///     Whether a pixel without a viewing ray is an error or a row of NaN.
+    ///
     /// Returns
     /// -------
     /// numpy.ndarray of shape (N, 3)
@@ -136,16 +190,67 @@ impl Camera {
     /// Raises
     /// ------
     /// ShapeMismatch, NotFinite, BadCamera
-    ///     For an array of another shape, for NaN and infinity, and for a pixel without a viewing ray.
-    #[pyo3(signature = (pixels, /))]
+    ///     For an array of another shape; with ``invalid="raise"`` for NaN and infinity, and for a pixel without a viewing ray.
+    #[pyo3(signature = (pixels, /, *, invalid="raise"))]
     fn bearing<'py>(
         &self,
         py: Python<'py>,
         pixels: &Bound<'py, PyAny>,
+        invalid: &str,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let pixels = arrays::rows("pixels", pixels)?;
-        let rays = py.detach(|| each("pixel", &pixels, |&u| self.0.bearing(u).map(Into::into)))?;
+        let pixels: Vec<[f64; 2]> = arrays::rows("pixels", pixels)?;
+        let rays = match invalid {
+            "raise" => py.detach(|| each("pixel", &pixels, |&u| self.0.bearing(u).map(Into::into)))?,
+            "nan" => py.detach(|| {
+                let ray = |&u| self.0.bearing(u).map_or([f64::NAN; 3], Into::into);
+                pixels.iter().map(ray).collect()
+            }),
+            _ => {
+                return Err(QuestError::new_err(format!(
+                    "invalid is {invalid:?}, expected \"raise\" or \"nan\""
+                )));
+            }
+        };
         Ok(arrays::to_numpy::<3>(py, rays))
+    }
+
+    /// Which pixels have a viewing ray.
+    ///
+    /// Parameters
+    /// ----------
+    /// pixels : array_like of shape (N, 2)
+    ///     Pixels (u, v).
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (N,) of bool
+    ///     False for NaN, infinity, and where the distortion has no inverse.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeMismatch
+    ///     For an array of another shape.
+    #[pyo3(signature = (pixels, /))]
+    fn has_ray<'py>(
+        &self,
+        py: Python<'py>,
+        pixels: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let pixels: Vec<[f64; 2]> = arrays::rows("pixels", pixels)?;
+        let found: Vec<bool> = py.detach(|| pixels.iter().map(|&u| self.0.bearing(u).is_ok()).collect());
+        Ok(found.into_pyarray(py))
+    }
+
+    /// The camera as plain numbers and lists, as PoseLib, COLMAP and the files of the command line have it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("model", self.model())?;
+        if let Some((width, height)) = self.0.size() {
+            dict.set_item("width", width)?;
+            dict.set_item("height", height)?;
+        }
+        dict.set_item("params", self.0.params().to_vec())?;
+        Ok(dict)
     }
 
     /// The pixels of points.

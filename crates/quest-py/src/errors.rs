@@ -3,6 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
+use quest_core::correspondence::Usable;
 use quest_core::robust::EstimateError;
 use quest_core::{CameraError, Degeneracy, InputError, MatchError};
 
@@ -12,7 +13,13 @@ create_exception!(
     PyValueError,
     "Why no answer can be given. The base of the other errors."
 );
-create_exception!(quest_pose, TooFewMatches, QuestError, "There are fewer matches than the solver needs.");
+create_exception!(
+    quest_pose,
+    NoAnswer,
+    QuestError,
+    "The matches have no answer: the base of NoPose, TooFewMatches and DegenerateInput."
+);
+create_exception!(quest_pose, TooFewMatches, NoAnswer, "There are fewer matches than the solver needs.");
 create_exception!(quest_pose, NotFinite, QuestError, "A number is NaN or infinite.");
 create_exception!(
     quest_pose,
@@ -23,13 +30,13 @@ create_exception!(
 create_exception!(
     quest_pose,
     DegenerateInput,
-    QuestError,
+    NoAnswer,
     "The points determine no pose, or have no direction."
 );
 create_exception!(
     quest_pose,
     NoPose,
-    QuestError,
+    NoAnswer,
     "No pose agrees with more of the matches than chance explains."
 );
 create_exception!(
@@ -71,6 +78,26 @@ pub(crate) fn estimate(error: &EstimateError) -> PyErr {
         EstimateError::Input(error) => input(error),
         EstimateError::NoPose { .. } => NoPose::new_err(error.to_string()),
         _ => QuestError::new_err(error.to_string()),
+    }
+}
+
+/// The exception for an estimate of the usable ones of the matches.
+pub(crate) fn estimate_of_usable(error: &EstimateError, usable: &Usable) -> PyErr {
+    match error {
+        EstimateError::Input(InputError::TooFewMatches { .. }) => {
+            TooFewMatches::new_err(reason(error, usable))
+        }
+        _ => estimate(error),
+    }
+}
+
+/// Why there is no estimate: where there are too few matches, also what is wrong with the others.
+pub(crate) fn reason(error: &EstimateError, usable: &Usable) -> String {
+    match (error, usable.error()) {
+        (EstimateError::Input(InputError::TooFewMatches { .. }), Some(first)) => {
+            format!("{error}; {} more have no bearing, the first of them: {first}", usable.invalid.len())
+        }
+        _ => error.to_string(),
     }
 }
 

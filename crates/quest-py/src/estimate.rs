@@ -1,15 +1,18 @@
 //! `estimate`: one pose from matches with outliers.
 
+use std::str::FromStr;
+
 use nalgebra::{UnitQuaternion, Vector3};
 use pyo3::prelude::*;
-use quest_core::RelativePose;
 use quest_core::lanes::{SearchScore, UnknownLoss};
 use quest_core::robust::{self, KnownDirection, Options, Priors};
+use quest_core::{InputError, RelativePose};
 
 use crate::arrays;
-use crate::errors::{self, QuestError};
+use crate::errors::{self, NoAnswer, QuestError, ShapeMismatch};
 use crate::estimate_result::Estimate;
 use crate::solve::{Views, solver_named};
+use crate::supervisor::Supervisor;
 
 /// One pose from matches with outliers.
 ///
@@ -46,6 +49,9 @@ use crate::solve::{Views, solver_named};
 /// known_direction : (array_like of shape (3,), array_like of shape (3,), float), optional
 ///     A direction in space in the frame of camera 1 and in that of camera 2, such as gravity or (twice the same) the
 ///     axis of the rotation, and how far a pose may turn one from the other, in radians.
+/// invalid : {"outlier", "pair", "raise"}
+///     What a match without a bearing is: a NaN, or a pixel for which a camera has no viewing ray. An outlier, which the
+///     result counts; or no match of a pair that has a pose (``NoAnswer``); or the error that it is for ``solve``.
 ///
 /// Returns
 /// -------
@@ -58,19 +64,23 @@ use crate::solve::{Views, solver_named};
 ///     that cannot be said, the best pose is returned where five agree with it, with its runner-up.
 /// TooFewMatches
 ///     For fewer than five matches, or than the solver takes.
-/// NotFinite, ShapeMismatch, DegenerateInput, BadCamera
+/// ShapeMismatch, DegenerateInput, BadCamera
 ///     As ``solve``.
+/// NoAnswer
+///     The base of the errors that mean that these matches have no pose; itself for ``invalid="pair"``.
+/// NotFinite
+///     For a NaN with ``invalid="raise"``, and for masked values.
 /// QuestError
 ///     The base of these, itself for an impossible option.
 ///
 /// Notes
 /// -----
-/// The lock of the interpreter is released while the search runs.
+/// The lock of the interpreter is released while the search runs; Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
     max_false_alarms=0.03, seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None,
-    known_direction=None
+    known_direction=None, invalid="outlier"
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
@@ -92,8 +102,10 @@ pub(crate) fn estimate(
     scores: Option<&Bound<'_, PyAny>>,
     initial_pose: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     known_direction: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>, f64)>,
+    invalid: &str,
 ) -> PyResult<Estimate> {
     let (solver, loss) = (solver_named(solver)?, loss_named(loss)?);
+    let invalid: Invalid = invalid.parse()?;
     let views = Views::new(x1, x2, camera1, camera2)?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     let pose = initial_pose.as_ref().map(pose).transpose()?;
@@ -114,12 +126,61 @@ pub(crate) fn estimate(
         Some([camera1, camera2]) => options.with_cameras(camera1, camera2),
         None => options,
     };
-    let found = py.detach(|| {
-        let matches = views.matches().map_err(|error| errors::input(&error))?;
+    let supervisor = Supervisor::new(None, 1);
+    py.detach(|| {
+        let usable = views.usable().map_err(|error| errors::input(&error))?;
+        if let Some(error) = usable.error().filter(|_| invalid != Invalid::Outlier) {
+            return Err(invalid.error(&error));
+        }
+        if let Some(scores) = scores.as_ref().filter(|scores| scores.len() != usable.given()) {
+            let (found, expected) = (scores.len(), usable.given());
+            return Err(ShapeMismatch::new_err(format!(
+                "scores has {found} numbers, expected {expected}, one a match"
+            )));
+        }
+        let scores = scores.as_ref().map(|scores| usable.keep(scores));
         let priors = Priors { scores: scores.as_deref(), pose, direction };
-        robust::estimate_with(&matches, &options, &priors).map_err(|error| errors::estimate(&error))
-    })?;
-    Ok(Estimate::new(&found))
+        let search = || robust::estimate_until(&usable.matches, &options, &priors, &|| supervisor.poll());
+        let found = supervisor.run_here(search)?;
+        let found = found.map_err(|error| errors::estimate_of_usable(&error, &usable))?;
+        Ok(Estimate::of_usable(&found, &usable))
+    })
+}
+
+/// What a match without a bearing is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Invalid {
+    /// An outlier.
+    Outlier,
+    /// A reason for its pair to have no pose.
+    Pair,
+    /// An error.
+    Raise,
+}
+
+impl FromStr for Invalid {
+    type Err = PyErr;
+
+    fn from_str(name: &str) -> PyResult<Self> {
+        match name {
+            "outlier" => Ok(Self::Outlier),
+            "pair" => Ok(Self::Pair),
+            "raise" => Ok(Self::Raise),
+            _ => Err(QuestError::new_err(format!(
+                "invalid is {name:?}, expected \"outlier\", \"pair\" or \"raise\""
+            ))),
+        }
+    }
+}
+
+impl Invalid {
+    /// The exception that an invalid match of a single pair is.
+    fn error(self, error: &InputError) -> PyErr {
+        match self {
+            Self::Pair => NoAnswer::new_err(error.to_string()),
+            _ => errors::input(error),
+        }
+    }
 }
 
 /// The loss of this name.
@@ -165,7 +226,7 @@ fn direction(
 
 fn vector3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
     let numbers: [f64; 3] = arrays::vector(name, given)?.try_into().map_err(|v: Vec<f64>| {
-        errors::ShapeMismatch::new_err(format!("{name} has the shape ({},), expected (3,)", v.len()))
+        ShapeMismatch::new_err(format!("{name} has the shape ({},), expected (3,)", v.len()))
     })?;
     Ok(numbers.into())
 }

@@ -1,16 +1,21 @@
 //! `estimate_batch`: many pairs at once, results in columns.
 
-use numpy::ndarray::{Array1, Array2, Array3};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, ToPyArray};
 use pyo3::prelude::*;
-use quest_core::robust::{self, Estimate, EstimateError, Options, Problem};
-use quest_core::{Camera, Correspondence, InputError, correspondence};
+use quest_core::Camera;
+use quest_core::correspondence::Usable;
+use quest_core::robust::{Batch, EstimateError, Options, Problem};
 
 use crate::arrays::{self, Points};
+use crate::batch_result::EstimateBatch;
 use crate::camera;
 use crate::errors::{self, BadCamera, ShapeMismatch};
-use crate::estimate::{loss_named, threshold_for};
+use crate::estimate::{Invalid, loss_named, threshold_for};
+use crate::estimate_result::Estimate;
 use crate::solve::solver_named;
+use crate::supervisor::Supervisor;
+
+/// Fewer pairs are solved where they are called: a thread costs as much as some of them.
+const FEW: usize = 4;
 
 /// The poses of many pairs, each as ``estimate`` finds it.
 ///
@@ -29,6 +34,16 @@ use crate::solve::solver_named;
 ///     the number of threads. A batch that is a part of a larger one begins with the index of its first pair there.
 /// num_threads : int
 ///     How many threads to use, all of the machine's for 0.
+/// scores : array_like of shape (M,), optional
+///     One a match, higher is better: the best matches of each pair are tried first.
+/// indices : array_like of shape (B,) of int, optional
+///     The key of each pair in place of ``first_index + i``: its answer then does not depend on which other pairs there are.
+/// invalid : {"outlier", "pair", "raise"}
+///     What a match without a bearing is, a NaN or a pixel for which a camera has no viewing ray: an outlier, counted in
+///     ``invalid_count``; the reason why its pair has no pose; or an error. It changes nothing of the other pairs.
+/// progress : callable, optional
+///     Called with the number of pairs that are done and that of all, some twenty times a second and at the end. An exception
+///     ends the batch.
 ///
 /// Returns
 /// -------
@@ -39,13 +54,18 @@ use crate::solve::solver_named;
 /// ------
 /// NotFinite, ShapeMismatch, DegenerateInput, BadCamera, QuestError
 ///     As ``estimate``, for points, offsets, cameras and options.
+///
+/// Notes
+/// -----
+/// The lock of the interpreter is released while the searches run; Ctrl-C ends them.
 #[pyfunction]
 #[pyo3(signature = (
     x1, x2, offsets, cameras1=None, cameras2=None, *, threshold=None, confidence=0.9999, min_iterations=300,
     max_iterations=100_000, max_false_alarms=0.03, seed=0, first_index=0, solver=None, loss="marginalised",
-    num_threads=0
+    num_threads=0, scores=None, indices=None, invalid="outlier", progress=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+#[expect(clippy::needless_pass_by_value, reason = "pyo3 hands callables over")]
 pub(crate) fn estimate_batch(
     py: Python<'_>,
     x1: &Bound<'_, PyAny>,
@@ -63,6 +83,10 @@ pub(crate) fn estimate_batch(
     solver: Option<&str>,
     loss: &str,
     num_threads: usize,
+    scores: Option<&Bound<'_, PyAny>>,
+    indices: Option<&Bound<'_, PyAny>>,
+    invalid: &str,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<EstimateBatch> {
     let (solver, loss) = (solver_named(solver)?, loss_named(loss)?);
     let (x1, x2) = (arrays::points("x1", x1)?, arrays::points("x2", x2)?);
@@ -77,35 +101,144 @@ pub(crate) fn estimate_batch(
         (first, second) => first.map(|first| (first.clone(), second.unwrap_or(first))),
     };
     let threshold = threshold_for(cameras.is_some(), threshold)?;
-    let index = first_index;
+    let index = if indices.is_some() { 0 } else { first_index };
     let numbers = Options { confidence, min_iterations, max_iterations, seed, index, ..Options::default() };
     let options = Options { threshold, max_false_alarms, solver, loss, ..numbers };
-    py.detach(|| {
-        let matches = matches(&x1, &x2, &offsets, cameras.as_ref())?;
-        let problems: Vec<_> = (0..pairs)
-            .map(|i| Problem {
-                matches: &matches[offsets[i]..offsets[i + 1]],
-                focal_lengths: cameras.as_ref().map_or([[1.0; 2]; 2], |(first, second)| {
+    let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
+    if let Some(scores) = scores.as_ref().filter(|scores| scores.len() != x1.len()) {
+        return Err(length("scores", scores.len(), x1.len(), "match"));
+    }
+    let indices = indices.map(|indices| arrays::keys("indices", indices)).transpose()?;
+    if let Some(indices) = indices.as_ref().filter(|indices| indices.len() != pairs) {
+        return Err(length("indices", indices.len(), pairs, "pair"));
+    }
+    let task =
+        Task { x1, x2, offsets, cameras, scores, indices, invalid: invalid.parse()?, options, num_threads };
+    py.detach(|| task.run(progress.as_ref()))
+}
+
+fn length(name: &str, found: usize, expected: usize, one: &str) -> PyErr {
+    ShapeMismatch::new_err(format!("{name} has {found} numbers, expected {expected}, one a {one}"))
+}
+
+/// All that a batch was called with.
+struct Task {
+    x1: Points,
+    x2: Points,
+    offsets: Vec<usize>,
+    cameras: Option<(Vec<Camera>, Vec<Camera>)>,
+    scores: Option<Vec<f64>>,
+    indices: Option<Vec<u64>>,
+    invalid: Invalid,
+    options: Options,
+    num_threads: usize,
+}
+
+impl Task {
+    /// The estimates of all pairs.
+    fn run(self, progress: Option<&Py<PyAny>>) -> PyResult<EstimateBatch> {
+        let usable = self.usable()?;
+        let scores: Option<Vec<Vec<f64>>> = self.scores.as_ref().map(|scores| {
+            let parts = self.offsets.windows(2).map(|w| &scores[w[0]..w[1]]);
+            parts.zip(&usable).map(|(part, usable)| usable.keep(part)).collect()
+        });
+        let scores: Option<Vec<Option<&[f64]>>> =
+            scores.as_ref().map(|all| all.iter().map(|part| Some(part.as_slice())).collect());
+        let is_refused = |usable: &Usable| self.invalid == Invalid::Pair && !usable.invalid.is_empty();
+        let problems: Vec<_> = usable
+            .iter()
+            .enumerate()
+            .map(|(i, usable)| Problem {
+                // A pair that is refused has no matches, which takes no time.
+                matches: if is_refused(usable) { &[] } else { &usable.matches },
+                focal_lengths: self.cameras.as_ref().map_or([[1.0; 2]; 2], |(first, second)| {
                     [first[i], second[i]].map(|camera| camera.focal_lengths().into())
                 }),
             })
             .collect();
-        let found = robust::estimate_batch(&problems, &options, num_threads);
+        let supervisor = Supervisor::new(progress, problems.len());
+        let done = || supervisor.add_one();
+        let batch = Batch {
+            threads: self.num_threads,
+            indices: self.indices.as_deref(),
+            scores: scores.as_deref().filter(|_| self.invalid != Invalid::Pair),
+            done: &done,
+            ..Batch::default()
+        };
+        let found = if self.num_threads == 1 || problems.len() < FEW {
+            let poll = || supervisor.poll();
+            let batch = Batch { threads: 1, is_cancelled: &poll, ..batch };
+            supervisor.run_here(|| batch.estimate(&problems, &self.options))?
+        } else {
+            let is_cancelled = || supervisor.is_cancelled();
+            let batch = Batch { is_cancelled: &is_cancelled, ..batch };
+            supervisor.run(|| batch.estimate(&problems, &self.options))?
+        };
         // What is wrong with the options is wrong for every pair.
         if let Some(Err(error @ EstimateError::Option { .. })) = found.first() {
             return Err(errors::estimate(error));
         }
-        let rows = problems.iter().map(|p| p.matches.len());
-        Ok(EstimateBatch::new(found.into_iter().zip(rows)))
-    })
+        let results = found.into_iter().zip(&usable).map(|(found, usable)| {
+            if let Some(error) = usable.error().filter(|_| is_refused(usable)) {
+                return Err(error.to_string());
+            }
+            match found {
+                Ok(found) => Ok(Estimate::of_usable(&found, usable)),
+                Err(error) => Err(errors::reason(&error, usable)),
+            }
+        });
+        let results: Vec<_> = results.collect();
+        let invalid = usable.iter().map(|usable| usable.invalid.len()).collect();
+        Ok(EstimateBatch::new(results, self.offsets, invalid))
+    }
+
+    /// The matches of each pair that have bearings.
+    fn usable(&self) -> PyResult<Vec<Usable>> {
+        let (found, expected) = (self.x2.len(), self.x1.len());
+        if self.x1.columns() != self.x2.columns() {
+            let (first, second) = (self.x1.columns(), self.x2.columns());
+            return Err(ShapeMismatch::new_err(format!(
+                "x1 has {first} columns and x2 has {second}, expected as many"
+            )));
+        }
+        if found != expected {
+            return Err(ShapeMismatch::new_err(format!(
+                "view 1 has {expected} points and view 2 has {found}, expected as many"
+            )));
+        }
+        let mut all = Vec::with_capacity(self.offsets.len());
+        for (i, w) in self.offsets.windows(2).enumerate() {
+            let (from, to) = (w[0], w[1]);
+            let one = match (&self.x1, &self.x2, &self.cameras) {
+                (Points::Image(x1), Points::Image(x2), None) => {
+                    Usable::from_image_points(&x1[from..to], &x2[from..to])
+                }
+                (Points::Image(x1), Points::Image(x2), Some((first, second))) => {
+                    Usable::from_pixels(&first[i], &x1[from..to], &second[i], &x2[from..to])
+                }
+                (Points::Bearings(x1), Points::Bearings(x2), None) => {
+                    Usable::from_bearings(&x1[from..to], &x2[from..to])
+                }
+                _ => {
+                    return Err(ShapeMismatch::new_err(
+                        "x1 and x2 have the shape (M, 3), expected pixels of shape (M, 2) where cameras are given",
+                    ));
+                }
+            };
+            let one = one.map_err(|error| errors::input(&error))?;
+            if let Some((index, source)) = one.invalid.first().filter(|_| self.invalid == Invalid::Raise) {
+                let (index, source) = (index + from, source.clone());
+                return Err(errors::input(&quest_core::InputError::Match { index, source }));
+            }
+            all.push(one);
+        }
+        Ok(all)
+    }
 }
 
 /// The offsets, ascending from zero to the number of rows.
 fn offsets_of(given: &Bound<'_, PyAny>, x1: &Points) -> PyResult<Vec<usize>> {
-    let rows = match x1 {
-        Points::Image(rows) => rows.len(),
-        Points::Bearings(rows) => rows.len(),
-    };
+    let rows = x1.len();
     let numbers = arrays::vector("offsets", given)?;
     let expected =
         || ShapeMismatch::new_err(format!("offsets are not whole numbers ascending from 0 to {rows}"));
@@ -145,235 +278,4 @@ fn cameras(name: &str, given: &Bound<'_, PyAny>, pairs: usize) -> PyResult<Vec<C
         )));
     }
     Ok(all)
-}
-
-fn matches(
-    x1: &Points,
-    x2: &Points,
-    offsets: &[usize],
-    cameras: Option<&(Vec<Camera>, Vec<Camera>)>,
-) -> PyResult<Vec<Correspondence>> {
-    let refuse = |error: InputError| errors::input(&error);
-    match (x1, x2, cameras) {
-        (Points::Image(x1), Points::Image(x2), None) => {
-            correspondence::from_image_points(x1, x2).map_err(refuse)
-        }
-        (Points::Bearings(x1), Points::Bearings(x2), None) => {
-            correspondence::from_bearings(x1, x2).map_err(refuse)
-        }
-        (Points::Image(x1), Points::Image(x2), Some((first, second))) => {
-            if x1.len() != x2.len() {
-                return Err(refuse(InputError::LengthMismatch { first: x1.len(), second: x2.len() }));
-            }
-            let mut all = Vec::with_capacity(x1.len());
-            for (i, w) in offsets.windows(2).enumerate() {
-                let pixels = (&x1[w[0]..w[1]], &x2[w[0]..w[1]]);
-                let pair = correspondence::from_pixels(&first[i], pixels.0, &second[i], pixels.1);
-                all.extend(pair.map_err(|error| match error {
-                    InputError::Match { index, source } => {
-                        refuse(InputError::Match { index: index + w[0], source })
-                    }
-                    other => refuse(other),
-                })?);
-            }
-            Ok(all)
-        }
-        (x1, x2, _) if x1.columns() != x2.columns() => Err(ShapeMismatch::new_err(format!(
-            "x1 has {} columns and x2 has {}, expected as many",
-            x1.columns(),
-            x2.columns()
-        ))),
-        _ => Err(ShapeMismatch::new_err(
-            "x1 and x2 have the shape (M, 3), expected pixels of shape (M, 2) where cameras are given",
-        )),
-    }
-}
-
-/// The estimates of many pairs, in columns; the row of a pair without a pose is zero.
-#[pyclass(frozen, eq, module = "quest_pose")]
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct EstimateBatch {
-    /// list of str or None : The model of each pair, as in ``Estimate``; None where no pose was found.
-    #[pyo3(get)]
-    model: Vec<Option<String>>,
-    /// list of str or None : Why a pair has no pose.
-    #[pyo3(get)]
-    reason: Vec<Option<String>>,
-    r: Array3<f64>,
-    t: Array2<f64>,
-    quat_wxyz: Array2<f64>,
-    covariance: Array3<f64>,
-    inliers: Array1<bool>,
-    inlier_count: Array1<usize>,
-    score: Array1<f64>,
-    iterations: Array1<usize>,
-}
-
-type State = (
-    (Vec<Option<String>>, Vec<Option<String>>),
-    (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>),
-    (Vec<bool>, Vec<usize>, Vec<f64>, Vec<usize>),
-);
-
-/// The batch that ``EstimateBatch.__reduce__`` took apart.
-#[pyfunction]
-pub(crate) fn _estimate_batch(state: State) -> PyResult<EstimateBatch> {
-    let ((model, reason), (r, t, quat_wxyz, covariance), (inliers, inlier_count, score, iterations)) = state;
-    let n = model.len();
-    let bad = |error: numpy::ndarray::ShapeError| ShapeMismatch::new_err(error.to_string());
-    Ok(EstimateBatch {
-        model,
-        reason,
-        r: Array3::from_shape_vec((n, 3, 3), r).map_err(bad)?,
-        t: Array2::from_shape_vec((n, 3), t).map_err(bad)?,
-        quat_wxyz: Array2::from_shape_vec((n, 4), quat_wxyz).map_err(bad)?,
-        covariance: Array3::from_shape_vec((n, 6, 6), covariance).map_err(bad)?,
-        inliers: inliers.into(),
-        inlier_count: inlier_count.into(),
-        score: score.into(),
-        iterations: iterations.into(),
-    })
-}
-
-impl EstimateBatch {
-    /// From the result of each pair, and its number of matches.
-    fn new(found: impl ExactSizeIterator<Item = (Result<Estimate, EstimateError>, usize)>) -> Self {
-        let n = found.len();
-        let mut all = Self {
-            model: vec![None; n],
-            reason: vec![None; n],
-            r: Array3::zeros((n, 3, 3)),
-            t: Array2::zeros((n, 3)),
-            quat_wxyz: Array2::zeros((n, 4)),
-            covariance: Array3::zeros((n, 6, 6)),
-            inliers: Array1::default(0),
-            inlier_count: Array1::zeros(n),
-            score: Array1::zeros(n),
-            iterations: Array1::zeros(n),
-        };
-        let mut inliers = Vec::new();
-        for (i, (result, matches)) in found.enumerate() {
-            match result {
-                Ok(estimate) => {
-                    all.set(i, &estimate);
-                    inliers.extend(estimate.inliers);
-                }
-                Err(error) => {
-                    all.reason[i] = Some(error.to_string());
-                    inliers.resize(inliers.len() + matches, false);
-                }
-            }
-        }
-        all.inliers = inliers.into();
-        all
-    }
-
-    fn set(&mut self, i: usize, estimate: &Estimate) {
-        self.model[i] = Some(estimate.model.name().to_owned());
-        let r_21 = estimate.pose.r_21();
-        for row in 0..3 {
-            for column in 0..3 {
-                self.r[(i, row, column)] = r_21[(row, column)];
-            }
-            self.t[(i, row)] = estimate.pose.t_21[row];
-        }
-        for (k, component) in estimate.pose.wxyz().into_iter().enumerate() {
-            self.quat_wxyz[(i, k)] = component;
-        }
-        for row in 0..6 {
-            for column in 0..6 {
-                self.covariance[(i, row, column)] = estimate.covariance[(row, column)];
-            }
-        }
-        self.inlier_count[i] = estimate.inlier_count;
-        self.score[i] = estimate.score;
-        self.iterations[i] = estimate.iterations;
-    }
-}
-
-#[pymethods]
-impl EstimateBatch {
-    fn __len__(&self) -> usize {
-        self.model.len()
-    }
-
-    /// numpy.ndarray of shape (B,) of bool : Whether a pose was found.
-    #[getter]
-    fn found<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        self.model.iter().map(Option::is_some).collect::<Vec<_>>().into_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B, 3, 3) : The rotations.
-    #[getter]
-    #[pyo3(name = "R")]
-    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
-        self.r.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B, 3) : The translations; their lengths are the parallaxes.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.t.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B, 4) : The rotations as unit quaternions, scalar first and not negative.
-    #[getter]
-    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.quat_wxyz.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B, 6, 6) : The covariances, as in ``Estimate``.
-    #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
-        self.covariance.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (M,) of bool : The inliers of all pairs, in the order of the points.
-    #[getter]
-    fn inliers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        self.inliers.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B,) of int : How many matches are inliers.
-    #[getter]
-    fn inlier_count<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<usize>> {
-        self.inlier_count.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B,) : How well each pose explains its matches, from 0 to 1.
-    #[getter]
-    fn score<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.score.to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (B,) of int : Samples drawn.
-    #[getter]
-    fn iterations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<usize>> {
-        self.iterations.to_pyarray(py)
-    }
-
-    fn __repr__(&self) -> String {
-        let found = self.model.iter().flatten().count();
-        format!("<EstimateBatch: {found} of {} pairs have a pose>", self.model.len())
-    }
-
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
-        let numbers = |a: numpy::ndarray::ArrayViewD<'_, f64>| a.iter().copied().collect::<Vec<_>>();
-        let state = (
-            (self.model.clone(), self.reason.clone()),
-            (
-                numbers(self.r.view().into_dyn()),
-                numbers(self.t.view().into_dyn()),
-                numbers(self.quat_wxyz.view().into_dyn()),
-                numbers(self.covariance.view().into_dyn()),
-            ),
-            (
-                self.inliers.to_vec(),
-                self.inlier_count.to_vec(),
-                self.score.to_vec(),
-                self.iterations.to_vec(),
-            ),
-        );
-        Ok((py.import("quest_pose._core")?.getattr("_estimate_batch")?, (state,)))
-    }
 }

@@ -1,22 +1,27 @@
 //! What `estimate` returns: `Estimate`, with the `RunnerUp` where there is one.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix3, Matrix6};
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use quest_core::RelativePose;
+use quest_core::correspondence::Usable;
 use quest_core::robust::{self, Evidence, Model};
+use quest_core::tangent::Tangent;
 
-use crate::arrays;
+use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 use crate::pose::{Pose, PoseState};
+use crate::solve::Views;
+use crate::{arrays, camera, html};
 
 /// Another pose that the matches of an estimate may mean: ``X2 = R @ X1 + t``.
 #[pyclass(frozen, eq, module = "quest_pose")]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RunnerUp {
-    pose: Pose,
+    pub(crate) pose: Pose,
     /// float : How well the pose explains all matches, from 0 to 1.
     #[pyo3(get)]
-    score: f64,
+    pub(crate) score: f64,
     /// int : How many matches are within the threshold and in front of both cameras.
     #[pyo3(get)]
     inlier_count: usize,
@@ -101,31 +106,37 @@ pub(crate) struct Estimate {
     /// ``"general"``, ``"planar"`` or ``"pure_rotation"`` (no translation that stands clear of the noise: ``t`` is the small
     /// vector that is left). Of a plane, and where the camera hardly moved, there may be a second pose, the runner-up.
     #[pyo3(get)]
-    model: String,
+    pub(crate) model: String,
     pose: Pose,
     covariance: Matrix6<f64>,
     inliers: Vec<bool>,
     /// float : How well the pose explains all matches, from 0 to 1.
     #[pyo3(get)]
-    score: f64,
+    pub(crate) score: f64,
     /// int : Samples drawn.
     #[pyo3(get)]
-    iterations: usize,
+    pub(crate) iterations: usize,
     /// RunnerUp or None : The pose that explains the matches nearly as well, where there is one.
     #[pyo3(get)]
     runner_up: Option<RunnerUp>,
     evidence: [f64; 3],
     /// float : The standard deviation of the inliers' Sampson errors, in the unit of the threshold.
     #[pyo3(get)]
-    noise_px: f64,
+    pub(crate) noise_px: f64,
+    /// int : How many matches have no bearing, such as pixels without a viewing ray; they are outliers.
+    #[pyo3(get)]
+    pub(crate) invalid_count: usize,
 }
 
-type State = (String, PoseState, Vec<f64>, Vec<bool>, f64, usize, Option<RunnerUpState>, [f64; 3], f64);
+/// An estimate as ``__reduce__`` takes it apart.
+pub(crate) type State =
+    (String, PoseState, Vec<f64>, Vec<bool>, f64, usize, Option<RunnerUpState>, [f64; 3], f64, usize);
 
 /// The estimate that ``Estimate.__reduce__`` took apart.
 #[pyfunction]
 pub(crate) fn _estimate(state: State) -> Estimate {
-    let (model, pose, covariance, inliers, score, iterations, runner_up, evidence, noise_px) = state;
+    let (model, pose, covariance, inliers, score, iterations, runner_up, evidence, noise_px, invalid_count) =
+        state;
     Estimate {
         model,
         pose: Pose::from_state(pose),
@@ -136,10 +147,17 @@ pub(crate) fn _estimate(state: State) -> Estimate {
         runner_up: runner_up.map(_runner_up),
         evidence,
         noise_px,
+        invalid_count,
     }
 }
 
 impl Estimate {
+    /// An estimate of the core, of the usable ones of the matches.
+    pub(crate) fn of_usable(found: &robust::Estimate, usable: &Usable) -> Self {
+        let inliers = usable.spread(&found.inliers);
+        Self { inliers, invalid_count: usable.invalid.len(), ..Self::new(found) }
+    }
+
     /// An estimate of the core.
     pub(crate) fn new(found: &robust::Estimate) -> Self {
         let Evidence { rotation_px, planar_px, general_px } = found.evidence;
@@ -157,7 +175,78 @@ impl Estimate {
             }),
             evidence: [rotation_px, planar_px, general_px],
             noise_px: found.noise_px,
+            invalid_count: 0,
         }
+    }
+
+    pub(crate) fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    pub(crate) fn covariance_matrix(&self) -> &Matrix6<f64> {
+        &self.covariance
+    }
+
+    pub(crate) fn inlier_flags(&self) -> &[bool] {
+        &self.inliers
+    }
+
+    pub(crate) fn evidence_px(&self) -> [f64; 3] {
+        self.evidence
+    }
+
+    pub(crate) fn other(&self) -> Option<&RunnerUp> {
+        self.runner_up.as_ref()
+    }
+
+    /// The depths of the inliers in views 1 and 2, and their rays in view 1; NaN for the other matches.
+    fn depths_and_rays(&self, views: &Views) -> PyResult<Vec<([f64; 2], [f64; 3])>> {
+        let usable = views.usable().map_err(|error| errors::input(&error))?;
+        if usable.given() != self.inliers.len() {
+            return Err(ShapeMismatch::new_err(format!(
+                "x1 and x2 have {} points, expected the {} of the estimate",
+                usable.given(),
+                self.inliers.len()
+            )));
+        }
+        let mut matches = usable.matches.iter();
+        let mut invalid = usable.invalid.iter().map(|(place, _)| *place).peekable();
+        let pose = self.pose.relative();
+        Ok(self
+            .inliers
+            .iter()
+            .enumerate()
+            .map(|(place, &is_inlier)| {
+                let m = if invalid.next_if_eq(&place).is_some() { None } else { matches.next() };
+                let m = m.filter(|_| is_inlier);
+                let found = m.and_then(|m| Some((m, pose.depths(m)?)));
+                found.map_or(([f64::NAN; 2], [f64::NAN; 3]), |(m, (z1, z2))| {
+                    ([z1, z2], (m.bearing1() * m.length1()).into())
+                })
+            })
+            .collect())
+    }
+
+    pub(crate) fn state(&self) -> State {
+        (
+            self.model.clone(),
+            self.pose.state(),
+            self.covariance.iter().copied().collect(),
+            self.inliers.clone(),
+            self.score,
+            self.iterations,
+            self.runner_up.as_ref().map(RunnerUp::state),
+            self.evidence,
+            self.noise_px,
+            self.invalid_count,
+        )
+    }
+
+    /// `[t]× R` with `|t| = 1`, zero without a translation.
+    fn unit_essential(&self) -> Matrix3<f64> {
+        let RelativePose { q_21, t_21 } = *self.pose.relative();
+        let direction = t_21.try_normalize(0.0).unwrap_or_default();
+        RelativePose::new(q_21, direction).essential()
     }
 
     fn covariance_rows(&self) -> Vec<[f64; 6]> {
@@ -165,6 +254,13 @@ impl Estimate {
         let columns: [[f64; 6]; 6] = self.covariance.into();
         columns.to_vec()
     }
+}
+
+/// The rows of a matrix.
+fn rows(m: &Matrix3<f64>) -> Vec<[f64; 3]> {
+    // nalgebra keeps columns, NumPy rows.
+    let rows: [[f64; 3]; 3] = m.transpose().into();
+    rows.map(|row| row.map(|x| x + 0.0)).to_vec()
 }
 
 #[pymethods]
@@ -208,7 +304,7 @@ impl Estimate {
 
     /// int : How many matches are inliers.
     #[getter]
-    fn inlier_count(&self) -> usize {
+    pub(crate) fn inlier_count(&self) -> usize {
         self.inliers.iter().filter(|inlier| **inlier).count()
     }
 
@@ -218,6 +314,165 @@ impl Estimate {
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         arrays::to_numpy(py, self.covariance_rows())
+    }
+
+    /// float : The part of the matches that are inliers; 0 of none.
+    #[getter]
+    fn inlier_ratio(&self) -> f64 {
+        self.inlier_count() as f64 / self.inliers.len().max(1) as f64
+    }
+
+    /// numpy.ndarray of shape (3, 3) : The essential matrix ``[t]x R`` with ``|t| = 1``, zero where ``t`` is: ``x2 @ E @ x1 = 0`` of rays.
+    #[getter]
+    #[pyo3(name = "E")]
+    fn essential<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        arrays::to_numpy(py, rows(&self.unit_essential()))
+    }
+
+    /// The fundamental matrix: ``u2 @ F @ u1 = 0`` of homogeneous pixels without distortion.
+    ///
+    /// Parameters
+    /// ----------
+    /// camera1, camera2 : Camera or what may stand for one
+    ///     The cameras of the estimate. ``camera2`` is ``camera1`` where absent.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (3, 3)
+    ///     With the Frobenius norm 1; zero where ``t`` is.
+    ///
+    /// Raises
+    /// ------
+    /// BadCamera
+    ///     For a fisheye camera, whose pixels no matrix describes.
+    #[pyo3(signature = (camera1, camera2=None))]
+    fn fundamental<'py>(
+        &self,
+        py: Python<'py>,
+        camera1: &Bound<'py, PyAny>,
+        camera2: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let first = camera::from_argument("camera1", camera1)?;
+        let second = camera2.map_or(Ok(first), |c| camera::from_argument("camera2", c))?;
+        let inverse = |name: &str, camera: &quest_core::Camera| {
+            let ((fx, fy), (cx, cy)) = (camera.focal_lengths(), camera.principal_point());
+            if camera.model().is_fisheye() {
+                return Err(BadCamera::new_err(format!(
+                    "{name} is a fisheye camera, expected one whose pixels a matrix K describes"
+                )));
+            }
+            Ok(Matrix3::new(1.0 / fx, 0.0, -cx / fx, 0.0, 1.0 / fy, -cy / fy, 0.0, 0.0, 1.0))
+        };
+        let (k1, k2) = (inverse("camera1", &first)?, inverse("camera2", &second)?);
+        let f = k2.transpose() * self.unit_essential() * k1;
+        Ok(arrays::to_numpy(py, rows(&f.try_normalize(0.0).unwrap_or_default())))
+    }
+
+    /// The pose as a matrix: ``X2 = T @ X1`` of homogeneous points.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (4, 4)
+    fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let pose = self.pose.relative();
+        let r: [[f64; 3]; 3] = pose.r_21().transpose().into();
+        let mut all: Vec<[f64; 4]> = (0..3).map(|k| [r[k][0], r[k][1], r[k][2], pose.t_21[k]]).collect();
+        all.push([0.0, 0.0, 0.0, 1.0]);
+        arrays::to_numpy(py, all)
+    }
+
+    /// The points of the inliers, triangulated.
+    ///
+    /// Parameters
+    /// ----------
+    /// x1, x2, camera1, camera2
+    ///     What ``estimate`` was called with.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (N, 3)
+    ///     In the frame of camera 1 and in the unit of ``t``, on the ray of view 1; NaN for matches that are no inliers or
+    ///     whose rays are parallel.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeMismatch
+    ///     For another number of points than the estimate is of.
+    #[pyo3(signature = (x1, x2, camera1=None, camera2=None))]
+    fn points<'py>(
+        &self,
+        py: Python<'py>,
+        x1: &Bound<'py, PyAny>,
+        x2: &Bound<'py, PyAny>,
+        camera1: Option<&Bound<'py, PyAny>>,
+        camera2: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = self.depths_and_rays(&Views::new(x1, x2, camera1, camera2)?)?;
+        let points = found.iter().map(|([z, _], ray)| ray.map(|x| x * z)).collect();
+        Ok(arrays::to_numpy::<3>(py, points))
+    }
+
+    /// The depths of the inliers in both views.
+    ///
+    /// Parameters
+    /// ----------
+    /// x1, x2, camera1, camera2
+    ///     What ``estimate`` was called with.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (N, 2)
+    ///     In the unit of ``t``: z in the frame of each camera, or the distance along the ray for fisheye cameras and
+    ///     bearings of length one; NaN as for ``points``.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeMismatch
+    ///     For another number of points than the estimate is of.
+    #[pyo3(signature = (x1, x2, camera1=None, camera2=None))]
+    fn depths<'py>(
+        &self,
+        py: Python<'py>,
+        x1: &Bound<'py, PyAny>,
+        x2: &Bound<'py, PyAny>,
+        camera1: Option<&Bound<'py, PyAny>>,
+        camera2: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = self.depths_and_rays(&Views::new(x1, x2, camera1, camera2)?)?;
+        Ok(arrays::to_numpy::<2>(py, found.into_iter().map(|(depths, _)| depths).collect()))
+    }
+
+    /// The covariance in the convention of another library; rotation first, as in ``covariance``.
+    ///
+    /// Parameters
+    /// ----------
+    /// convention : {"additive", "gtsam", "se3_left", "se3_right"}
+    ///     ``"additive"``: that of ``covariance``. ``"se3_left"``: ``T' = exp(xi) T``. ``"se3_right"`` and ``"gtsam"`` (its
+    ///     ``Pose3``): ``T' = T exp(xi)``. xi is (rotation vector, translation).
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of shape (6, 6)
+    ///
+    /// Raises
+    /// ------
+    /// QuestError
+    ///     For another convention.
+    #[pyo3(signature = (convention, /))]
+    fn covariance_as<'py>(&self, py: Python<'py>, convention: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let tangent = match convention {
+            "additive" => Tangent::Additive,
+            "se3_left" => Tangent::Se3Left,
+            "gtsam" | "se3_right" => Tangent::Se3Right,
+            _ => {
+                return Err(QuestError::new_err(format!(
+                    "the convention is {convention:?}, expected \"additive\", \"gtsam\", \"se3_left\" or \"se3_right\""
+                )));
+            }
+        };
+        let changed = self.pose.relative().covariance_in(&self.covariance, tangent);
+        let columns: [[f64; 6]; 6] = changed.transpose().into();
+        Ok(arrays::to_numpy(py, columns.to_vec()))
     }
 
     /// dict of str to float : The median residual of the inliers under each model, in the unit of the threshold.
@@ -240,7 +495,7 @@ impl Estimate {
     /// -------
     /// dict
     ///     The keys of the command line's JSON.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    pub(crate) fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("model", &self.model)?;
         self.pose.write_to(&dict)?;
@@ -258,6 +513,9 @@ impl Estimate {
         }
         dict.set_item("evidence", evidence)?;
         dict.set_item("noise_px", self.noise_px)?;
+        if self.invalid_count > 0 {
+            dict.set_item("invalid_count", self.invalid_count)?;
+        }
         Ok(dict)
     }
 
@@ -272,18 +530,11 @@ impl Estimate {
         )
     }
 
+    fn _repr_html_(&self) -> String {
+        html::estimate(self)
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
-        let state = (
-            self.model.clone(),
-            self.pose.state(),
-            self.covariance.iter().copied().collect(),
-            self.inliers.clone(),
-            self.score,
-            self.iterations,
-            self.runner_up.as_ref().map(RunnerUp::state),
-            self.evidence,
-            self.noise_px,
-        );
-        Ok((py.import("quest_pose._core")?.getattr("_estimate")?, (state,)))
+        Ok((py.import("quest_pose._core")?.getattr("_estimate")?, (self.state(),)))
     }
 }

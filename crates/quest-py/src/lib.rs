@@ -2,16 +2,21 @@
 //! core and maps its errors.
 
 mod arrays;
+mod batch_result;
 mod camera;
 mod candidate;
+mod colmap;
 mod errors;
 mod estimate;
 mod estimate_batch;
 mod estimate_result;
+mod foreign_camera;
+mod html;
 mod pose;
 mod servo;
 mod solve;
 mod solve_batch;
+mod supervisor;
 mod third_view;
 
 use pyo3::pymodule;
@@ -22,17 +27,21 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::batch_result::{_estimate_batch, EstimateBatch};
+    #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::candidate::{_candidate, Candidate};
     #[pymodule_export]
+    use crate::colmap::{_colmap_export, _colmap_read_pairs, _colmap_verify, _colmap_write};
+    #[pymodule_export]
     use crate::errors::{
-        BadCamera, DegenerateInput, NoPose, NotFinite, QuestError, ShapeMismatch, TooFewMatches,
+        BadCamera, DegenerateInput, NoAnswer, NoPose, NotFinite, QuestError, ShapeMismatch, TooFewMatches,
     };
     #[pymodule_export]
     use crate::estimate::estimate;
     #[pymodule_export]
-    use crate::estimate_batch::{_estimate_batch, EstimateBatch, estimate_batch};
+    use crate::estimate_batch::estimate_batch;
     #[pymodule_export]
     use crate::estimate_result::{_estimate, _runner_up, Estimate, RunnerUp};
     #[pymodule_export]

@@ -28,6 +28,10 @@ impl Pose {
         (self.wxyz(), self.0.t_21.into())
     }
 
+    pub(crate) fn relative(&self) -> &RelativePose {
+        &self.0
+    }
+
     pub(crate) fn wxyz(&self) -> [f64; 4] {
         self.0.wxyz()
     }
@@ -65,7 +69,7 @@ impl Pose {
         format!("quat_wxyz={:.6?}, t={:.6?}", self.wxyz(), self.0.t_21.as_slice())
     }
 
-    fn rows(&self) -> [[f64; 3]; 3] {
+    pub(crate) fn rows(&self) -> [[f64; 3]; 3] {
         // nalgebra keeps columns, NumPy rows.
         self.0.r_21().transpose().into()
     }

@@ -2,6 +2,7 @@
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use quest_core::correspondence::Usable;
 use quest_core::solver::{Kinds, SolverName, UnknownKinds};
 use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence, quaternion};
 
@@ -172,6 +173,15 @@ impl Views {
         match self {
             Self::Pixels(cameras, ..) => Some(cameras),
             _ => None,
+        }
+    }
+
+    /// The matches that have bearings, and which do not.
+    pub(crate) fn usable(&self) -> Result<Usable, InputError> {
+        match self {
+            Self::Image(x1, x2) => Usable::from_image_points(x1, x2),
+            Self::Pixels(cameras, u1, u2) => Usable::from_pixels(&cameras[0], u1, &cameras[1], u2),
+            Self::Bearings(x1, x2) => Usable::from_bearings(x1, x2),
         }
     }
 

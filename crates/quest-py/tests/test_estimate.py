@@ -121,6 +121,8 @@ def test_bad_input() -> None:
     with pytest.raises(qp.TooFewMatches, match="4.*5"):
         qp.estimate(u1[:4], u2[:4], K)
     with pytest.raises(qp.NotFinite, match="match 0"):
+        qp.estimate(u1 * np.nan, u2, K, invalid="raise")
+    with pytest.raises(qp.TooFewMatches, match="20 more have no bearing, the first of them: match 0.*NaN"):
         qp.estimate(u1 * np.nan, u2, K)
     for options, word in [
         ({"threshold": -1.0}, "threshold"),
@@ -258,4 +260,4 @@ def test_bad_batches() -> None:
     with pytest.raises(qp.QuestError, match="threshold"):
         qp.estimate_batch(x1, x2, offsets, K, threshold=-1.0)
     with pytest.raises(qp.NotFinite, match="match"):
-        qp.estimate_batch(x1 * np.nan, x2, offsets, K)
+        qp.estimate_batch(x1 * np.nan, x2, offsets, K, invalid="raise")

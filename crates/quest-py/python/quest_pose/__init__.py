@@ -14,8 +14,10 @@ forward).
 array([[0., 0., 1.]])
 
 ``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``third_view``
-decides between two possible poses, ``solve`` finds the candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. All errors are a
-``QuestError``.
+decides between two possible poses, ``solve`` finds the candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. ``quest_pose.colmap`` verifies the
+image pairs of COLMAP databases, ``quest_pose.compat`` takes the place of other libraries, ``quest_pose.arrow`` and
+``quest_pose.dask`` work on columns and on clusters. What is wrong with points, cameras and options is a ``QuestError``, that matches have no
+answer a ``NoAnswer``; what is no array of numbers at all is a ``TypeError``.
 """
 
 from typing import NamedTuple
@@ -30,6 +32,7 @@ from quest_pose._core import (
     DegenerateInput,
     Estimate,
     EstimateBatch,
+    NoAnswer,
     NoPose,
     NotFinite,
     QuestError,
@@ -53,6 +56,7 @@ __all__ = [
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
+    "NoAnswer",
     "NoPose",
     "NotFinite",
     "QuestError",

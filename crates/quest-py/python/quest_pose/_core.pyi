@@ -1,8 +1,10 @@
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from os import PathLike
 from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import NotRequired
 
 __all__ = [
     "BadCamera",
@@ -13,6 +15,7 @@ __all__ = [
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
+    "NoAnswer",
     "NoPose",
     "NotFinite",
     "QuestError",
@@ -22,6 +25,10 @@ __all__ = [
     "TooFewMatches",
     "__version__",
     "_candidate",
+    "_colmap_export",
+    "_colmap_read_pairs",
+    "_colmap_verify",
+    "_colmap_write",
     "_estimate",
     "_estimate_batch",
     "_runner_up",
@@ -41,14 +48,21 @@ _Bools: TypeAlias = NDArray[np.bool_]
 _Counts: TypeAlias = NDArray[np.uint64]
 _Kind: TypeAlias = Literal["exact", "from_complex", "rotation_only", "planar"]
 _Model: TypeAlias = Literal["general", "planar", "pure_rotation"]
+_Invalid: TypeAlias = Literal["outlier", "pair", "raise"]
+_Convention: TypeAlias = Literal["additive", "gtsam", "se3_left", "se3_right"]
+_Names: TypeAlias = list[tuple[str, str]]
+_Path: TypeAlias = str | PathLike[str]
+# A Camera, a matrix K, a mapping, or a camera of another library by its attributes.
+_AnyCamera: TypeAlias = Any
 
 class QuestError(ValueError): ...
-class TooFewMatches(QuestError): ...
+class NoAnswer(QuestError): ...
+class TooFewMatches(NoAnswer): ...
 class NotFinite(QuestError): ...
 class ShapeMismatch(QuestError): ...
-class DegenerateInput(QuestError): ...
+class DegenerateInput(NoAnswer): ...
 class BadCamera(QuestError): ...
-class NoPose(QuestError): ...
+class NoPose(NoAnswer): ...
 
 @final
 class Camera:
@@ -57,6 +71,10 @@ class Camera:
     ) -> Camera: ...
     @staticmethod
     def from_k(k: ArrayLike, /) -> Camera: ...
+    @staticmethod
+    def from_opencv(
+        k: ArrayLike, dist: ArrayLike | None = None, *, fisheye: bool = False, size: tuple[int, int] | None = None
+    ) -> Camera: ...
     @property
     def model(self) -> str: ...
     @property
@@ -65,11 +83,13 @@ class Camera:
     def width(self) -> int | None: ...
     @property
     def height(self) -> int | None: ...
-    def bearing(self, pixels: ArrayLike, /) -> _Array: ...
+    def bearing(self, pixels: ArrayLike, /, *, invalid: Literal["raise", "nan"] = "raise") -> _Array: ...
+    def has_ray(self, pixels: ArrayLike, /) -> _Bools: ...
     def project(self, points: ArrayLike, /) -> _Array: ...
+    def to_dict(self) -> dict[str, Any]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
-    __hash__: ClassVar[None]  # type: ignore[assignment]
+    def __hash__(self) -> int: ...
     def __getnewargs_ex__(self) -> tuple[tuple[str, Sequence[float]], dict[str, int | None]]: ...
 
 @type_check_only
@@ -115,8 +135,8 @@ class Candidate:
 def solve(
     x1: ArrayLike,
     x2: ArrayLike,
-    camera1: Camera | ArrayLike | None = None,
-    camera2: Camera | ArrayLike | None = None,
+    camera1: _AnyCamera = None,
+    camera2: _AnyCamera = None,
     *,
     solver: str | None = None,
     kinds: Literal["all", "exact", "planar"] = "all",
@@ -133,6 +153,7 @@ class _RunnerUpDict(TypedDict):
 @type_check_only
 class _EstimateDict(_RunnerUpDict):
     model: _Model
+    invalid_count: NotRequired[int]
     covariance: list[list[float]]
     inliers: list[bool]
     iterations: int
@@ -192,6 +213,22 @@ class Estimate:
     def evidence(self) -> dict[str, float]: ...
     @property
     def noise_px(self) -> float: ...
+    @property
+    def invalid_count(self) -> int: ...
+    @property
+    def inlier_ratio(self) -> float: ...
+    @property
+    def E(self) -> _Array: ...
+    def fundamental(self, camera1: _AnyCamera, camera2: _AnyCamera = None) -> _Array: ...
+    def matrix(self) -> _Array: ...
+    def points(
+        self, x1: ArrayLike, x2: ArrayLike, camera1: _AnyCamera = None, camera2: _AnyCamera = None
+    ) -> _Array: ...
+    def depths(
+        self, x1: ArrayLike, x2: ArrayLike, camera1: _AnyCamera = None, camera2: _AnyCamera = None
+    ) -> _Array: ...
+    def covariance_as(self, convention: _Convention, /) -> _Array: ...
+    def _repr_html_(self) -> str: ...
     def to_dict(self) -> _EstimateDict: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
@@ -222,7 +259,29 @@ class EstimateBatch:
     def score(self) -> _Array: ...
     @property
     def iterations(self) -> _Counts: ...
+    @property
+    def offsets(self) -> _Counts: ...
+    @property
+    def invalid_count(self) -> _Counts: ...
+    @property
+    def parallax(self) -> _Array: ...
+    @property
+    def noise_px(self) -> _Array: ...
+    @property
+    def evidence(self) -> _Array: ...
+    @property
+    def runner_up_R(self) -> _Array: ...
+    @property
+    def runner_up_quat_wxyz(self) -> _Array: ...
+    @property
+    def runner_up_t(self) -> _Array: ...
+    @property
+    def runner_up_score(self) -> _Array: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def _repr_html_(self) -> str: ...
     def __len__(self) -> int: ...
+    def __getitem__(self, index: int, /) -> Estimate | None: ...
+    def __iter__(self) -> Iterator[Estimate | None]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
@@ -231,8 +290,8 @@ class EstimateBatch:
 def estimate(
     x1: ArrayLike,
     x2: ArrayLike,
-    camera1: Camera | ArrayLike | None = None,
-    camera2: Camera | ArrayLike | None = None,
+    camera1: _AnyCamera = None,
+    camera2: _AnyCamera = None,
     *,
     threshold: float | None = None,
     confidence: float = 0.9999,
@@ -246,13 +305,14 @@ def estimate(
     scores: ArrayLike | None = None,
     initial_pose: tuple[ArrayLike, ArrayLike] | None = None,
     known_direction: tuple[ArrayLike, ArrayLike, float] | None = None,
+    invalid: _Invalid = "outlier",
 ) -> Estimate: ...
 def estimate_batch(
     x1: ArrayLike,
     x2: ArrayLike,
     offsets: ArrayLike,
-    cameras1: Camera | ArrayLike | Sequence[Camera | ArrayLike] | None = None,
-    cameras2: Camera | ArrayLike | Sequence[Camera | ArrayLike] | None = None,
+    cameras1: _AnyCamera | Sequence[_AnyCamera] = None,
+    cameras2: _AnyCamera | Sequence[_AnyCamera] = None,
     *,
     threshold: float | None = None,
     confidence: float = 0.9999,
@@ -264,6 +324,10 @@ def estimate_batch(
     solver: str | None = None,
     loss: Literal["marginalised", "truncated"] = "marginalised",
     num_threads: int = 0,
+    scores: ArrayLike | None = None,
+    indices: ArrayLike | None = None,
+    invalid: _Invalid = "outlier",
+    progress: Callable[[int, int], object] | None = None,
 ) -> EstimateBatch: ...
 def _estimate(state: tuple[Any, ...]) -> Estimate: ...
 def _estimate_batch(state: tuple[Any, ...]) -> EstimateBatch: ...
@@ -350,3 +414,33 @@ class RobotServo:
     def step(self, points: ArrayLike, /) -> Command: ...
     @property
     def has_arrived(self) -> bool: ...
+def _colmap_verify(
+    database: _Path,
+    pairs: _Names | None,
+    threshold: float,
+    min_inliers: int,
+    min_inlier_ratio: float,
+    confidence: float,
+    max_iterations: int,
+    existing: str,
+    uncalibrated: str,
+    watermark: float,
+    num_threads: int,
+    seed: int,
+    dry_run: bool,
+    progress: Callable[[int, int], object] | None,
+) -> str: ...
+def _colmap_read_pairs(path: _Path) -> _Names: ...
+def _colmap_write(
+    database: _Path, pairs: _Names, estimates: Sequence[Estimate | None], overwrite: bool
+) -> None: ...
+def _colmap_export(
+    database: _Path,
+    target: _Path,
+    what: str,
+    pairs: _Names | None,
+    threshold: float,
+    min_inliers: int,
+    seed: int,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[int, _Names]: ...

@@ -1,0 +1,114 @@
+//! Signals and progress while the core works: the calling thread asks Python every few hundredths of a second.
+
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use pyo3::prelude::*;
+
+/// How often Python is asked: often enough for a signal to be answered within two tenths of a second.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// Ends work that a signal, or the callable that is told of its progress, wants ended.
+pub(crate) struct Supervisor<'a> {
+    progress: Option<&'a Py<PyAny>>,
+    total: AtomicUsize,
+    done: AtomicUsize,
+    asked: Mutex<Instant>,
+    failure: Mutex<Option<PyErr>>,
+    cancelled: AtomicBool,
+}
+
+impl<'a> Supervisor<'a> {
+    /// Of work on `total` things, of whose progress a callable is told: how many are done, and how many there are.
+    pub(crate) fn new(progress: Option<&'a Py<PyAny>>, total: usize) -> Self {
+        Self {
+            progress,
+            total: AtomicUsize::new(total),
+            done: AtomicUsize::new(0),
+            asked: Mutex::new(Instant::now()),
+            failure: Mutex::new(None),
+            cancelled: AtomicBool::new(false),
+        }
+    }
+
+    /// Runs work on the calling thread, which has to call [`poll`](Self::poll) often; Python's lock must not be held.
+    pub(crate) fn run_here<T>(&self, work: impl FnOnce() -> T) -> PyResult<T> {
+        let result = work();
+        self.finish()?;
+        Ok(result)
+    }
+
+    /// Runs work on other threads, which have to ask [`is_cancelled`](Self::is_cancelled) often; Python's lock must not be held.
+    pub(crate) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+        let caller = thread::current();
+        let result = thread::scope(|scope| {
+            let worker = scope.spawn(move || {
+                let result = work();
+                caller.unpark();
+                result
+            });
+            while !worker.is_finished() {
+                thread::park_timeout(PERIOD);
+                self.poll();
+            }
+            worker.join().unwrap_or_else(|panic| resume_unwind(panic))
+        });
+        self.finish()?;
+        Ok(result)
+    }
+
+    /// So many things are done, of so many.
+    pub(crate) fn set(&self, done: usize, total: usize) {
+        self.total.store(total, Ordering::Relaxed);
+        self.done.store(done, Ordering::Relaxed);
+    }
+
+    /// One more is done.
+    pub(crate) fn add_one(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Whether the work is to end.
+    pub(crate) fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Asks Python, unless it has been asked just now; whether the work is to end. On the calling thread alone.
+    pub(crate) fn poll(&self) -> bool {
+        {
+            let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+            if asked.elapsed() < PERIOD || self.is_cancelled() {
+                return self.is_cancelled();
+            }
+            *asked = Instant::now();
+        }
+        Python::attach(|py| {
+            if let Err(error) = py.check_signals().and_then(|()| self.tell(py)) {
+                *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                self.cancelled.store(true, Ordering::Relaxed);
+            }
+        });
+        self.is_cancelled()
+    }
+
+    fn tell(&self, py: Python<'_>) -> PyResult<()> {
+        let Some(progress) = self.progress else { return Ok(()) };
+        let (done, total) = (self.done.load(Ordering::Relaxed), self.total.load(Ordering::Relaxed));
+        progress.call1(py, (done, total))?;
+        Ok(())
+    }
+
+    /// What ended the work, or the last word on its progress.
+    fn finish(&self) -> PyResult<()> {
+        if let Some(error) = self.failure.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            return Err(error);
+        }
+        if self.progress.is_some() {
+            return Python::attach(|py| self.tell(py));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,167 @@
+"""Columns in and out: partitions and retries change no bit."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import quest_pose as qp
+from quest_pose import arrow, dask
+from scenes import make_scene
+
+PARAMS = [1060.0, 1060.0, 514.0, 384.0]
+CAMERA = qp.Camera("PINHOLE", PARAMS)
+
+
+def pairs(count: int) -> list[dict[str, Any]]:
+    rng = np.random.default_rng(23)
+    rows = []
+    for k in range(count):
+        n = 3 if k == 4 else 20 + k
+        scene = make_scene(200 + k, n)
+        rows.append(
+            {
+                "pair": 2**62 + 7 * k,
+                "x1": (scene.u1 + rng.normal(0, 0.3, (n, 2))).tolist(),
+                "x2": scene.u2.tolist(),
+                "camera1": "PINHOLE",
+                "params1": PARAMS,
+                "camera2": "PINHOLE",
+                "params2": PARAMS,
+                "score": rng.uniform(size=n).tolist(),
+                "note": "left out",
+            }
+        )
+    return rows
+
+
+def table(rows: list[dict[str, Any]]) -> Any:
+    pa = pytest.importorskip("pyarrow")
+    schema = arrow.schema_in().append(pa.field("note", pa.string()))
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def test_columns_are_those_of_the_batch() -> None:
+    rows = pairs(7)
+    found = arrow.estimate(table(rows))
+    assert found.schema == arrow.schema_out()
+    assert found.column("pair").to_pylist() == [row["pair"] for row in rows]
+    for k, (row, one) in enumerate(zip(rows, found.to_pylist(), strict=True)):
+        if k == 4:
+            assert one["q_wxyz"] is None
+            assert "found 3 matches" in one["reason"]
+            assert one["inliers"] == [False] * 3
+            continue
+        expected = qp.estimate(row["x1"], row["x2"], CAMERA, index=row["pair"], scores=row["score"])
+        assert one["q_wxyz"] == expected.quat_wxyz.tolist()
+        assert one["t"] == expected.t.tolist()
+        assert one["covariance"] == expected.covariance.ravel().tolist()
+        assert one["inliers"] == expected.inliers.tolist()
+        assert one["model"] == expected.model
+        assert (one["runner_up_t"] is None) == (expected.runner_up is None)
+
+
+def test_partitions_change_no_bit() -> None:
+    whole = table(pairs(7))
+    found = arrow.estimate(whole).to_pylist()
+    parts = [arrow.estimate(whole.slice(a, n), num_threads=2).to_pylist() for a, n in [(0, 3), (3, 0), (3, 4)]]
+    assert sum(parts, []) == found
+    batches = [arrow.estimate(batch).to_pylist() for batch in whole.to_batches(max_chunksize=2)]
+    assert sum(batches, []) == found
+
+
+def test_other_forms_go_in_as_they_are() -> None:
+    pa = pytest.importorskip("pyarrow")
+    rows = pairs(3)
+    found = arrow.estimate(table(rows)).to_pylist()
+    large = pa.schema(
+        [pa.field(f.name, pa.large_list(f.type.value_type) if pa.types.is_list(f.type) else f.type) for f in arrow.schema_in()]
+    )
+    assert arrow.estimate(pa.Table.from_pylist(rows, schema=large)).to_pylist() == found
+    assert arrow.estimate(pa.RecordBatch.from_pylist(rows, schema=arrow.schema_in())).to_pylist() == found
+
+    class Foreign:
+        def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+            return table(rows).__arrow_c_stream__(requested_schema)
+
+    assert arrow.estimate(Foreign()).to_pylist() == found
+    # Without keys the number of the row is the key.
+    plain = table(rows).select(["x1", "x2"])
+    one = arrow.estimate(plain, threshold=500.0, max_iterations=300, max_false_alarms=np.inf, first_index=5)
+    assert one.column("pair").to_pylist() == [5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda t: t.drop_columns(["x2"]), "x2"),
+        (lambda t: t.set_column(1, "x1", t.column("score")), "fixed_size_list"),
+        (lambda t: t.set_column(2, "x2", t.slice(1, 1).column("x2")), "differ in length"),
+        (lambda t: t.drop_columns(["params1"]), "params1"),
+    ],
+)
+def test_bad_columns(change: Any, word: str) -> None:
+    pytest.importorskip("pyarrow")
+    with pytest.raises(qp.QuestError, match=word):
+        arrow.estimate(change(table(pairs(2)).slice(0, 1)))
+
+
+def test_what_is_no_table_is_refused() -> None:
+    pytest.importorskip("pyarrow")
+    with pytest.raises(qp.QuestError, match="list"):
+        arrow.estimate([1, 2])
+
+
+class Here:
+    """A cluster of one, which works when it is asked."""
+
+    def __init__(self) -> None:
+        self.submitted = 0
+
+    def submit(self, function: Any, *args: Any, pure: bool, **options: Any) -> Any:
+        self.submitted += 1
+        return function(*args, **options)
+
+    def gather(self, futures: list[Any]) -> list[Any]:
+        return futures
+
+
+def test_blocks_are_whole_and_done_once(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    rows = pairs(7)
+    parquet.write_table(table(rows), tmp_path / "pairs.parquet", row_group_size=2)
+    client = Here()
+    target = tmp_path / "poses"
+    files = dask.estimate_parquet(client, tmp_path / "pairs.parquet", target, rows=3)
+    assert client.submitted == len(files) == 3
+    found = pa.concat_tables([parquet.read_table(file) for file in files]).to_pylist()
+    assert found == arrow.estimate(table(rows)).to_pylist()
+    before = files[0].stat().st_mtime_ns
+    files[1].unlink()
+    # What a worker left that was killed.
+    (target / f".{files[1].name}.{os.getpid()}").write_text("half")
+    assert dask.estimate_parquet(client, tmp_path / "pairs.parquet", target, rows=3) == files
+    assert client.submitted == 4
+    assert files[0].stat().st_mtime_ns == before
+    assert parquet.read_table(files[1]).num_rows == 3
+
+
+@pytest.mark.filterwarnings("default")
+def test_on_dask(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(table(pairs(4)), tmp_path / "pairs.parquet")
+    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        files = dask.estimate_parquet(client, tmp_path / "pairs.parquet", tmp_path / "poses", rows=2)
+    assert [parquet.read_table(file).num_rows for file in files] == [2, 2]
+
+
+def test_pyarrow_is_needed_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ImportError):
+        arrow.estimate([])
+    with pytest.raises(ImportError):
+        dask.estimate_parquet(None, "a", "b")
