@@ -11,7 +11,7 @@ const NULL_SINCE: i64 = 3_140_001;
 /// The columns that tell versions apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schema {
-    /// `PRAGMA user_version`: `major * 1000000 + minor * 10000 + patch * 100 + revision`, 0 before COLMAP 3.?.
+    /// `PRAGMA user_version`: `major * 1000000 + minor * 10000 + patch * 100 + revision`, 0 where none was set.
     pub user_version: i64,
     /// `two_view_geometries` has `qvec` and `tvec` (3.8).
     pub has_pose: bool,
