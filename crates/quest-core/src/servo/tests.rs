@@ -164,7 +164,7 @@ fn lost_features_hold_and_found_ones_resume() {
         let servo = Servo::new(&goal, filter(&world, &goal, Some(PLANE)), law, Safety::new(LIMITS));
         let all = records(&world, &mut plant, servo, 500, rng);
         for (index, record) in all.iter().enumerate().skip(starting(&all)) {
-            let Step { command, estimate } = &record.step;
+            let Step { command, estimate, .. } = &record.step;
             if (30..60).contains(&index) {
                 assert_eq!(estimate.unwrap_err(), HoldReason::TooFewFeatures);
                 assert_eq!(*command, Twist::zero());
@@ -211,10 +211,11 @@ fn turns_do_not_push_features_out() {
         fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason> {
             Ok(Estimate {
                 pose: RelativePose::identity(),
-                covariance: nalgebra::Matrix6::zeros(),
+                covariance: Some(nalgebra::Matrix6::zeros()),
                 inliers: features.len(),
                 residual: 0.0,
                 alternatives: 1,
+                support: Support::Full,
             })
         }
     }

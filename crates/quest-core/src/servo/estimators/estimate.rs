@@ -1,23 +1,46 @@
 //! What an estimator says of one image.
 
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector3};
 
 use crate::RelativePose;
+
+/// How much of the pose the images support.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// Rotation and translation.
+    Full,
+    /// The rotation alone: there is no parallax that stands clear of the noise, or the depths are too uncertain for a translation to
+    /// point the right way.
+    RotationOnly,
+    /// Several poses that command different things; this is the likeliest.
+    Several,
+}
+
+/// A motion of the camera in its own frame, as it was commanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// The way, in the unit of `t_21`.
+    pub linear: Vector3<f64>,
+    /// The rotation vector, in radians.
+    pub angular: Vector3<f64>,
+}
 
 /// The pose of the current camera relative to the goal, as far as one image tells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The current camera (2) relative to the goal (1), in the unit of the run.
     pub pose: RelativePose,
-    /// The covariance of a small rotation from the left in radians, then of `t_21` in the unit of the run. Of the images
-    /// alone where the estimator has no other; infinite on the diagonal where nothing is known.
-    pub covariance: Matrix6<f64>,
+    /// The covariance of a small rotation from the left in radians, then of `t_21` in the unit of the run; `None` for an estimator
+    /// that knows none.
+    pub covariance: Option<Matrix6<f64>>,
     /// How many features it rests on.
     pub inliers: usize,
     /// Root mean square of their reprojection errors, on the plane z = 1; NaN never.
     pub residual: f64,
     /// How many answers fit about as well: 1 where the pose is settled.
     pub alternatives: usize,
+    /// How much of the pose the images support.
+    pub support: Support,
 }
 
 /// Why there is no pose that can be trusted.
@@ -42,6 +65,12 @@ pub enum HoldReason {
     /// The covariance of the pose is too large to act on it.
     #[error("the pose is too uncertain")]
     Uncertain,
+    /// The distance to the goal does not fall although the camera was told to move.
+    #[error("the distance to the goal does not fall although the camera was told to move")]
+    Diverging,
+    /// The image is older than the last one, or too old.
+    #[error("the image is older than the last one, or too old")]
+    Stale,
 }
 
 impl HoldReason {
@@ -55,6 +84,8 @@ impl HoldReason {
             Self::Inconsistent => "inconsistent",
             Self::Jump => "jump",
             Self::Uncertain => "uncertain",
+            Self::Diverging => "diverging",
+            Self::Stale => "stale",
         }
     }
 }
@@ -67,4 +98,30 @@ pub trait PoseEstimator {
     /// # Errors
     /// The reason to hold.
     fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason>;
+
+    /// How the camera was told to move between the last image and the next one. An estimator may hold its hypotheses against it.
+    fn moved(&mut self, _motion: &Motion) {}
+
+    /// Begins anew, but keeps what it knows of the way since.
+    fn restart(&mut self) {}
+
+    /// Forgets everything but the goal and the depths that were given.
+    fn reset(&mut self) {
+        self.restart();
+    }
+
+    /// Which features agreed with the pose of the last image; empty for an estimator that does not say.
+    fn inliers(&self) -> &[bool] {
+        &[]
+    }
+
+    /// How many hypotheses are alive.
+    fn hypotheses(&self) -> usize {
+        0
+    }
+
+    /// How often it has begun anew.
+    fn restarts(&self) -> usize {
+        0
+    }
 }

@@ -4,3 +4,4 @@ pub mod depth_filter;
 pub(crate) mod estimate;
 pub mod per_frame;
 pub(crate) mod source;
+pub mod tracker;

@@ -3,9 +3,9 @@
 //! It is here to be compared with. Under noise the candidates of one image differ more from the truth than they differ from
 //! one another, and near the goal their depths are noise; [`DepthFilter`](crate::servo::DepthFilter) carries on what it knows.
 
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
-use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator};
+use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator, Support};
 use crate::servo::estimators::source::PoseSource;
 use crate::{Candidate, Candidates, Correspondence, RelativePose};
 
@@ -167,10 +167,11 @@ impl<S: PoseSource> PoseEstimator for PerFrame<S> {
         }
         Ok(Estimate {
             pose,
-            covariance: Matrix6::from_diagonal_element(f64::INFINITY),
+            covariance: None,
             inliers: self.matches.len(),
             residual: candidate.residual,
             alternatives: 1,
+            support: Support::Full,
         })
     }
 }

@@ -42,6 +42,11 @@ impl ControlLaw for FreeCameraLaw {
     fn command(&mut self, pose: &RelativePose) -> Twist {
         Twist { linear: pose.t_21 * (self.rate * self.unit), angular: pose.q_21.scaled_axis() * self.rate }
     }
+
+    /// `V = |t|² + |log R|²`.
+    fn potential(&self, pose: &RelativePose) -> Option<f64> {
+        Some(pose.t_21.norm_squared() + pose.q_21.angle().powi(2))
+    }
 }
 
 #[cfg(test)]

@@ -5,9 +5,11 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 
-use crate::servo::controller::{Border, Servo, Step};
+use crate::servo::controller::Servo;
+use crate::servo::controller::safety::Border;
+use crate::servo::controller::state::Step;
 use crate::servo::estimators::estimate::PoseEstimator;
-use crate::servo::simulation::imaging::{Disturbances, Imaging};
+use crate::servo::simulation::imaging::{Disturbances, Imaging, Mistakes};
 use crate::servo::{ControlLaw, FilterOptions, Limits, Plant};
 use crate::{Camera, RelativePose};
 
@@ -67,22 +69,13 @@ impl World {
         let Disturbances { noise_px, rounded, .. } = self.disturbances;
         let variance = noise_px * noise_px + if rounded { 1.0 / 12.0 } else { 0.0 };
         let noise = variance.sqrt().max(LEAST_PX) / self.camera.focal_lengths().0;
-        FilterOptions {
-            noise,
-            goal_noise: noise / (self.goal_images.max(1) as f64).sqrt(),
-            largest_turn: 1.5 * limits.turn_rate * self.period,
-            largest_move: 1.5 * limits.speed * self.period / unit,
-            ..FilterOptions::default()
-        }
+        FilterOptions::for_images(noise, self.goal_images, limits, self.period, unit)
     }
 
     /// The image but for so many pixels at the left and the right; `None` for a camera without a size.
     #[must_use]
     pub fn border(&self, margin: f64) -> Option<Border> {
-        let (width, height) = self.camera.size()?;
-        let imaging = self.imaging();
-        let at = |u| imaging.on_plane([u, 0.5 * f64::from(height)]);
-        Some(Border { left: at(margin)?[0], right: at(f64::from(width) - 1.0 - margin)?[0] })
+        Border::of_camera(&self.camera, margin)
     }
 
     /// Whether all features are at least so many pixels inside of the image.
@@ -90,6 +83,12 @@ impl World {
     pub fn sees_all(&self, pose: &RelativePose, margin: f64) -> bool {
         let imaging = self.imaging();
         imaging.project(pose).all(|pixel| pixel.is_some_and(|p| imaging.is_inside(p, margin)))
+    }
+
+    /// How many features are in the image from a pose.
+    #[must_use]
+    pub fn seen_from(&self, pose: &RelativePose) -> usize {
+        self.imaging().project(pose).flatten().count()
     }
 
     /// Whether a law that is told the true pose, with `unit` metres for one, keeps all features in view for so many images.
@@ -121,8 +120,11 @@ impl World {
     ) {
         let imaging = self.imaging();
         let mut waiting = VecDeque::new();
+        let mut mistakes = Mistakes::default();
         for index in 0..images {
-            waiting.push_back(imaging.image(&plant.pose(), index, rng));
+            let mut image = imaging.image(&plant.pose(), index, rng);
+            mistakes.apply(&mut image, &self.disturbances, rng);
+            waiting.push_back(image);
             // Before the first image has come through, there is none.
             let late = waiting.len() > self.disturbances.delay;
             let pixels = if late { waiting.pop_front() } else { None };

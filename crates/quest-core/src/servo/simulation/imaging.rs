@@ -5,6 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::servo::controller::safety::on_plane;
 use crate::{Camera, RelativePose};
 
 /// The disturbances of the images.
@@ -16,12 +17,61 @@ pub struct Disturbances {
     pub rounded: bool,
     /// The share of features that are somewhere else in the image.
     pub outliers: f64,
+    /// Wrong matches that stay: how many and for how long. Descriptors make the same mistakes while a camera stands still.
+    pub sticky: Option<Sticky>,
     /// The share of images that show the features as seen from somewhere else.
     pub wrong_images: f64,
     /// Delay of the images that the controller gets, in images.
     pub delay: usize,
     /// From the first image of this range to before the last one, only so many features are found.
     pub lost: Option<(std::ops::Range<usize>, usize)>,
+}
+
+/// Wrong matches that stay the same for a while.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sticky {
+    /// The share of features that are matched with another one.
+    pub share: f64,
+    /// For so many images in the mean; infinite for ever.
+    pub images: f64,
+}
+
+/// The wrong matches of a run: of each feature the one that is taken for it, and how far beside.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Mistakes(Vec<Option<(usize, [f64; 2])>>);
+
+impl Mistakes {
+    /// How far beside the other feature the match is, in pixels.
+    const BESIDE: f64 = 3.0;
+
+    /// Puts the wrong matches into an image, after some have changed.
+    pub(crate) fn apply(
+        &mut self,
+        image: &mut [Option<[f64; 2]>],
+        disturbances: &Disturbances,
+        rng: &mut ChaCha8Rng,
+    ) {
+        let Some(Sticky { share, images }) = disturbances.sticky else { return };
+        let n = image.len();
+        let draw = |rng: &mut ChaCha8Rng| {
+            let beside = [0; 2].map(|_| Self::BESIDE * rng.sample::<f64, _>(StandardNormal));
+            (rng.random::<f64>() < share).then_some((rng.random_range(0..n), beside))
+        };
+        if self.0.is_empty() {
+            self.0 = (0..n).map(|_| draw(rng)).collect();
+        }
+        for mistake in &mut self.0 {
+            if rng.random::<f64>() < 1.0 / images {
+                *mistake = draw(rng);
+            }
+        }
+        let right = image.to_vec();
+        for (pixel, mistake) in image.iter_mut().zip(&self.0) {
+            if let Some((other, [du, dv])) = mistake {
+                *pixel = right[*other].map(|[u, v]| [u + du, v + dv]);
+            }
+        }
+    }
 }
 
 /// A camera with an image of known size, and its disturbances.
@@ -99,8 +149,7 @@ impl Imaging<'_> {
 
     /// The image's features on the plane z = 1.
     pub(crate) fn on_plane(&self, pixel: [f64; 2]) -> Option<[f64; 2]> {
-        let ray = self.camera.bearing(pixel).ok()?;
-        (ray.z > 0.0).then(|| [ray.x / ray.z, ray.y / ray.z])
+        on_plane(self.camera, pixel)
     }
 }
 

@@ -34,7 +34,7 @@ fn start() -> RelativePose {
 }
 
 fn is_safe(step: &Step) -> bool {
-    let Step { command, estimate } = step;
+    let Step { command, estimate, .. } = step;
     command.is_finite()
         && command.linear.norm() <= LIMITS.speed
         && command.angular.norm() <= LIMITS.turn_rate

@@ -15,6 +15,12 @@ impl FirstImages {
         Self { places: vec![(0, vec![[0.0; 2]; wanted]); features], seen: 0, wanted }
     }
 
+    /// Forgets the images so far.
+    pub(crate) fn clear(&mut self) {
+        self.places.iter_mut().for_each(|(count, _)| *count = 0);
+        self.seen = 0;
+    }
+
     /// Adds an image. With the last of them it becomes the mean of all, and true is returned.
     ///
     /// Of a feature the places within `reach` of their median count; it has to be seen in more than half of the images.

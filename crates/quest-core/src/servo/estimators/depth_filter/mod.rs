@@ -10,7 +10,7 @@
 //!
 //! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](crate::servo::PerFrame).
 
-mod first_images;
+pub(crate) mod first_images;
 pub(crate) mod fit;
 pub(crate) mod options;
 mod reference;
@@ -23,7 +23,7 @@ use crate::servo::estimators::depth_filter::first_images::FirstImages;
 use crate::servo::estimators::depth_filter::fit::{Fitted, MAX_STEPS, Problem, Workspace};
 use crate::servo::estimators::depth_filter::reference::DepthReference;
 use crate::servo::estimators::depth_filter::search::Search;
-use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator};
+use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator, Support};
 use crate::servo::estimators::source::PoseSource;
 use crate::{Candidates, Correspondence, RelativePose};
 
@@ -69,6 +69,11 @@ pub struct DepthFilter<S> {
     missed: usize,
     /// Whether there has been a pose.
     has_started: bool,
+    /// The depths that were given, with their precisions.
+    given: Option<(Vec<f64>, Vec<f64>)>,
+    /// Which features agreed with the last pose.
+    inliers: Vec<bool>,
+    restarts: usize,
 }
 
 impl<S: PoseSource> DepthFilter<S> {
@@ -98,6 +103,9 @@ impl<S: PoseSource> DepthFilter<S> {
             candidates: Candidates::new(),
             missed: 0,
             has_started: false,
+            given: None,
+            inliers: vec![false; n],
+            restarts: 0,
         }
     }
 
@@ -106,15 +114,47 @@ impl<S: PoseSource> DepthFilter<S> {
     ///
     /// What is not a positive number counts as infinitely far.
     pub fn set_depths(&mut self, depths: &[f64], precision: f64) {
-        let first = &mut self.hypotheses[0];
-        let inverse = depths.iter().map(|z| if *z > 0.0 { 1.0 / z } else { 0.0 });
-        first.reference.set_flat(precision);
-        for (rho, known) in first.reference.inverse_depths.iter_mut().zip(inverse) {
-            *rho = known;
+        let precisions = vec![precision; self.goal.len()];
+        let depths: Vec<f64> = depths.iter().map(|z| if *z > 0.0 { *z } else { f64::INFINITY }).collect();
+        self.set_depths_each(&depths, &precisions);
+    }
+
+    /// As [`set_depths`](Self::set_depths), with a precision for each depth; NaN where a depth is not known.
+    pub fn set_depths_each(&mut self, depths: &[f64], precisions: &[f64]) {
+        self.given = Some((depths.to_vec(), precisions.to_vec()));
+        self.take_given_depths();
+    }
+
+    /// Begins with the depths that were given.
+    fn take_given_depths(&mut self) {
+        let Some((depths, precisions)) = &self.given else { return };
+        let reference = &mut self.hypotheses[0].reference;
+        reference.set_flat(self.options.spread);
+        let known = || depths.iter().filter(|z| !z.is_nan());
+        let mean = known().map(|z| 1.0 / z).sum::<f64>() / known().count().max(1) as f64;
+        if !(mean > 0.0 && mean.is_finite()) {
+            return;
         }
-        first.reference.normalise();
-        first.reference.set_information(precision.powi(-2));
-        (first.score, self.count, self.missed) = (0.0, 1, self.options.patience);
+        let n = reference.len();
+        for (i, (z, precision)) in depths.iter().zip(precisions).enumerate().take(n) {
+            if !z.is_nan() {
+                reference.inverse_depths[i] = 1.0 / (z * mean);
+                reference.information[i * n + i] = precision.powi(-2);
+            }
+        }
+        reference.normalise();
+        (self.hypotheses[0].score, self.count, self.missed) = (0.0, 1, self.options.patience);
+    }
+
+    /// How exactly the goal's depths are known, relative to each: one standard deviation.
+    pub fn depth_precisions(&self) -> impl Iterator<Item = f64> {
+        let n = self.goal.len();
+        let known = self.hypotheses[..self.count].first();
+        let of = move |h: &Hypothesis, i: usize| {
+            h.reference.information[i * n + i].max(f64::MIN_POSITIVE).sqrt().recip()
+                / h.reference.inverse_depths[i].abs().max(1e-3)
+        };
+        known.into_iter().flat_map(move |h| (0..n).map(move |i| of(h, i)))
     }
 
     /// The goal's depths as they are known now, with a harmonic mean of 1; infinite where a feature is infinitely far.
@@ -155,7 +195,35 @@ impl<S: PoseSource> PoseEstimator for DepthFilter<S> {
         } else if !self.search.is_running() {
             self.missed = self.missed.saturating_add(1);
         }
+        for (inlier, kept) in self.inliers.iter_mut().zip(&self.frame) {
+            *inlier = result.is_ok() && kept.is_some();
+        }
         result
+    }
+
+    fn restart(&mut self) {
+        self.restarts += 1;
+        (self.count, self.missed) = (0, 0);
+        self.search = Search::new(self.goal.len());
+        self.first_images.clear();
+    }
+
+    fn reset(&mut self) {
+        self.restart();
+        (self.restarts, self.has_started) = (0, false);
+        self.take_given_depths();
+    }
+
+    fn inliers(&self) -> &[bool] {
+        &self.inliers
+    }
+
+    fn hypotheses(&self) -> usize {
+        self.count
+    }
+
+    fn restarts(&self) -> usize {
+        self.restarts
     }
 }
 
@@ -258,10 +326,11 @@ impl<S: PoseSource> DepthFilter<S> {
         }
         Estimate {
             pose: fitted.pose,
-            covariance: *covariance,
+            covariance: Some(*covariance),
             inliers,
             residual: self.sigma * (squares / (2 * inliers) as f64).sqrt(),
             alternatives: self.count,
+            support: Support::Full,
         }
     }
 }

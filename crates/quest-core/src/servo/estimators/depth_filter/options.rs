@@ -1,6 +1,8 @@
 //! What the filter is told of the images and the motion.
 
+use crate::RelativePose;
 use crate::servo::estimators::depth_filter::fit::Plane;
+use crate::servo::twist::Limits;
 
 /// What is known of the images and the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +31,25 @@ pub struct FilterOptions {
     pub patience: usize,
     /// For a robot that moves on a plane with a level camera: how exactly.
     pub plane: Option<Plane>,
+    /// Where the camera is on the robot whose plane that is: takes points of the camera's frame to the base's, with the translation
+    /// in the unit of the goal's depths. The identity for a level camera above the axle.
+    pub base: RelativePose,
+}
+
+impl FilterOptions {
+    /// What follows from the images and the limits: `noise` is the standard deviation of a coordinate on the plane z = 1, the goal's
+    /// features are the mean of `goal_images`, `period` is the time from image to image in seconds, the features are at about `unit` metres.
+    /// The camera may move half as fast again as it is told.
+    #[must_use]
+    pub fn for_images(noise: f64, goal_images: usize, limits: &Limits, period: f64, unit: f64) -> Self {
+        Self {
+            noise,
+            goal_noise: noise / (goal_images.max(1) as f64).sqrt(),
+            largest_turn: 1.5 * limits.turn_rate * period,
+            largest_move: 1.5 * limits.speed * period / unit,
+            ..Self::default()
+        }
+    }
 }
 
 impl Default for FilterOptions {
@@ -46,6 +67,7 @@ impl Default for FilterOptions {
             first_images: 10,
             patience: 5,
             plane: None,
+            base: RelativePose::identity(),
         }
     }
 }

@@ -186,6 +186,28 @@ impl ControlLaw for DifferentialDriveLaw {
             Phase::Start | Phase::Turning => Twist::drive(0.0, -self.turn_gain * heading.sin()),
         }
     }
+
+    /// To the goal's heading, on the spot.
+    fn turn(&mut self, pose: &RelativePose) -> Twist {
+        Twist::drive(0.0, -self.turn_gain * PlanarPose::new(pose).heading.sin())
+    }
+
+    /// `r² (2 − cos ψ)` while it drives: both factors fall, and noise of the bearing near the goal does no harm. On the spot there is
+    /// no distance to fall.
+    fn potential(&self, pose: &RelativePose) -> Option<f64> {
+        let planar = PlanarPose::new(pose);
+        let is_driving = matches!(self.phase, Phase::Driving(_));
+        is_driving.then(|| planar.distance.powi(2) * (2.0 - planar.bearing.cos().abs()))
+    }
+
+    /// Ahead, back, ahead.
+    fn exploration(&self, attempt: usize) -> Twist {
+        Twist::drive(if attempt.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.0)
+    }
+
+    fn reset(&mut self) {
+        (self.mean, self.phase) = (None, Phase::Start);
+    }
 }
 
 #[cfg(test)]
