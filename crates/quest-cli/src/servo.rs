@@ -11,7 +11,7 @@ use quest_core::Camera;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
     Choice, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw,
-    Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo, World,
+    Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Rig, Safety, Servo, Tracker, World,
 };
 use quest_core::solver::SolverName;
 use quest_io::Output;
@@ -89,6 +89,8 @@ enum Scenario {
 enum Rule {
     /// A filter on the goal's inverse depths.
     Filter,
+    /// A map of the goal's features with key images, as the Python package uses it.
+    Map,
     /// The candidate with the closest goal depths, as section 10.1 chooses.
     ClosestDepths,
     /// The candidate that explains the image best with the goal's depths.
@@ -236,7 +238,7 @@ fn drive<P: Plant, L: ControlLaw>(arguments: &Arguments, mut setup: Setup, plant
         Rule::ClosestDepths => Some(Choice::ClosestDepths),
         Rule::Reprojection => Some(Choice::Reprojection),
         Rule::RotationAxis => Some(Choice::RotationAxis),
-        Rule::Filter => None,
+        Rule::Filter | Rule::Map => None,
     };
     let length = match arguments.translation {
         Translation::GoalDepths => Length::GoalDepths,
@@ -250,6 +252,11 @@ fn drive<P: Plant, L: ControlLaw>(arguments: &Arguments, mut setup: Setup, plant
         // Exact images need no averaging.
         let first_images = if arguments.noise > 0.0 { options.first_images } else { 1 };
         let options = FilterOptions { first_images, ..options };
+        if arguments.rule == Rule::Map {
+            let tracker = Tracker::new(&goal, arguments.solver, options);
+            let servo = controller(&setup, &goal, tracker, law);
+            return watch(arguments, setup, plant, (pixels, &goal), servo);
+        }
         let filter = DepthFilter::new(&goal, arguments.solver, options);
         let servo = controller(&setup, &goal, filter, law);
         return watch(arguments, setup, plant, (pixels, &goal), servo);
@@ -269,7 +276,8 @@ fn controller<E: PoseEstimator, L: ControlLaw>(
 ) -> Servo<E, L> {
     let mut safety = Safety::new(setup.limits);
     safety.border = setup.plane.and_then(|_| setup.world.border(40.0));
-    Servo::new(goal, estimator, law, safety)
+    let rig = Rig { unit: setup.unit, period: setup.world.period, ..Rig::default() };
+    Servo::new(goal, estimator, law, safety).with_rig(rig)
 }
 
 /// Runs the loop and records it.

@@ -29,7 +29,7 @@ impl From<&RelativePose> for Pose {
 pub(super) struct FrameRecord {
     /// In seconds.
     pub(super) time: f64,
-    /// `tracking`, or why the robot holds.
+    /// What the loop does: `tracking`, or why the robot holds.
     state: &'static str,
     /// The true pose, in metres.
     truth: Pose,
@@ -56,7 +56,7 @@ impl FrameRecord {
         let pose = |e: Option<&Estimate>| e.map(|e| Pose::from(&e.pose));
         Self {
             time: record.time,
-            state: estimate.map_or_else(|reason| reason.name(), |_| "tracking"),
+            state: record.step.state.name(),
             truth: Pose::from(&record.truth),
             position: record.truth.inverse().t_21.into(),
             estimate: pose(estimate.ok()),
