@@ -1,194 +1,15 @@
 //! `quest_pose.servo`: one image in, one command out.
 
-use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2, ToPyArray};
+mod command;
+mod given;
+
+use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
-use quest_core::servo::{
-    Border, ControlLaw, DepthFilter, DifferentialDriveLaw, FilterOptions, FreeCameraLaw, Limits, Plane,
-    Safety, Servo, Step,
-};
-use quest_core::solver::SolverName;
+use quest_core::servo::{Axes, DifferentialDriveLaw, FreeCameraLaw, Mount, Plane};
 
-use crate::errors::{NotFinite, QuestError, ShapeMismatch, TooFewMatches};
-use crate::{arrays, camera};
-
-/// What one image led to. It never changes: its arrays are fresh copies at each access.
-///
-/// While the loop holds, the velocities are zero and ``state`` says why.
-#[pyclass(frozen, module = "quest_pose.servo")]
-#[derive(Debug)]
-pub(crate) struct Command(Step);
-
-#[pymethods]
-impl Command {
-    /// numpy.ndarray of shape (3,) : The velocity in m/s, in the camera's frame: x to the right, y down, z forward.
-    #[getter]
-    fn linear<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.command.linear.as_slice().to_pyarray(py)
-    }
-
-    /// numpy.ndarray of shape (3,) : The angular velocity in rad/s, in the camera's frame.
-    #[getter]
-    fn angular<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.command.angular.as_slice().to_pyarray(py)
-    }
-
-    /// float : The speed of a robot, ``linear[2]``.
-    #[getter]
-    fn speed(&self) -> f64 {
-        self.0.command.linear.z
-    }
-
-    /// float : The turn rate of a robot, ``angular[1]``, positive to the right. ROS counts it positive to the left.
-    #[getter]
-    fn turn_rate(&self) -> f64 {
-        self.0.command.angular.y
-    }
-
-    /// str : ``"tracking"``, or why the loop holds.
-    ///
-    /// ``"starting"``: the first images are being averaged, and their candidates tried. ``"too_few_features"``, ``"degenerate"``: the features
-    /// determine no pose. ``"inconsistent"``: no pose explains them. ``"jump"``: the pose is further from the last
-    /// one than the camera can have moved. ``"uncertain"``: its covariance is too large.
-    #[getter]
-    fn state(&self) -> &'static str {
-        self.0.estimate.as_ref().map_or_else(|reason| reason.name(), |_| "tracking")
-    }
-
-    /// numpy.ndarray of shape (3, 3) or None : The rotation from the goal's frame to the camera's.
-    #[getter]
-    #[pyo3(name = "R")]
-    fn r<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
-        let estimate = self.0.estimate.as_ref().ok()?;
-        // nalgebra keeps columns, NumPy rows.
-        let rows: [[f64; 3]; 3] = Matrix3::transpose(&estimate.pose.r_21()).into();
-        Some(arrays::to_numpy(py, rows.to_vec()))
-    }
-
-    /// numpy.ndarray of shape (3,) or None : The goal's origin in the camera's frame.
-    ///
-    /// Its unit is the same in the whole run: the harmonic mean of the features' depths at the goal.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        let estimate = self.0.estimate.as_ref().ok()?;
-        Some(estimate.pose.t_21.as_slice().to_pyarray(py))
-    }
-
-    /// int : How many features the pose rests on; 0 while the loop holds.
-    #[getter]
-    fn inliers(&self) -> usize {
-        self.0.estimate.as_ref().map_or(0, |e| e.inliers)
-    }
-
-    fn __repr__(&self) -> String {
-        let (v, w) = (self.0.command.linear.as_slice(), self.0.command.angular.as_slice());
-        format!("<Command {}: linear={v:.4?}, angular={w:.4?}>", self.state())
-    }
-}
-
-/// What both controllers are made of.
-#[derive(Debug)]
-struct Loop<L> {
-    camera: Option<quest_core::Camera>,
-    features: usize,
-    servo: Servo<DepthFilter<SolverName>, L>,
-}
-
-/// What both controllers are told.
-struct Given<'a, 'py> {
-    goal: &'a Bound<'py, PyAny>,
-    camera: Option<&'a Bound<'py, PyAny>>,
-    limits: (f64, f64),
-    noise: f64,
-    goal_images: u32,
-    period: f64,
-    unit: f64,
-    depths: Option<&'a Bound<'py, PyAny>>,
-    solver: Option<&'a str>,
-    plane: Option<Plane>,
-    border: f64,
-}
-
-/// A positive number of the argument `name`.
-fn positive(name: &str, value: f64) -> PyResult<f64> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(value);
-    }
-    Err(QuestError::new_err(format!("{name} is {value}, expected a positive number")))
-}
-
-impl<L: ControlLaw> Loop<L> {
-    fn new(given: &Given<'_, '_>, law: L) -> PyResult<Self> {
-        let camera = given.camera.map(|c| camera::from_argument("camera", c)).transpose()?;
-        let solver = given.solver.map_or(Ok(SolverName::default()), str::parse);
-        let solver = solver.map_err(|error| QuestError::new_err(error.to_string()))?;
-        let points: Vec<[f64; 2]> = arrays::rows("goal", given.goal)?;
-        let needed = solver.info().min_matches;
-        if points.len() < needed {
-            let found = points.len();
-            return Err(TooFewMatches::new_err(format!(
-                "goal has {found} features, expected at least {needed}"
-            )));
-        }
-        let goal: Option<Vec<[f64; 2]>> = points.iter().map(|&p| on_plane(camera.as_ref(), p)).collect();
-        let goal = goal.ok_or_else(|| {
-            NotFinite::new_err("a feature of goal is not finite or has no viewing ray, expected one in front")
-        })?;
-        let limits = Limits {
-            speed: positive("max_speed", given.limits.0)?,
-            turn_rate: positive("max_turn_rate", given.limits.1)?,
-        };
-        let focal = camera.as_ref().map_or(1.0, |c| c.focal_lengths().0);
-        let noise = positive("noise", given.noise)? / focal;
-        let (period, unit) = (positive("period", given.period)?, positive("unit", given.unit)?);
-        let options = FilterOptions {
-            noise,
-            goal_noise: noise / f64::from(given.goal_images.max(1)).sqrt(),
-            largest_turn: 1.5 * limits.turn_rate * period,
-            largest_move: 1.5 * limits.speed * period / unit,
-            plane: given.plane,
-            ..FilterOptions::default()
-        };
-        let mut filter = DepthFilter::new(&goal, solver, options);
-        if let Some(depths) = given.depths {
-            let depths = arrays::vector("depths", depths)?;
-            if depths.len() != goal.len() || !depths.iter().all(|z| *z > 0.0) {
-                let (found, expected) = (depths.len(), goal.len());
-                return Err(ShapeMismatch::new_err(format!(
-                    "depths has {found} numbers, expected {expected} that are positive"
-                )));
-            }
-            filter.set_depths(&depths, 0.02);
-        }
-        let mut safety = Safety::new(limits);
-        safety.border = camera.as_ref().and_then(|c| {
-            let (width, height) = c.size()?;
-            let at = |u: f64| on_plane(Some(c), [u, 0.5 * f64::from(height)]).map(|m| m[0]);
-            Some(Border { left: at(given.border)?, right: at(f64::from(width) - 1.0 - given.border)? })
-        });
-        safety.border = safety.border.filter(|_| given.plane.is_some());
-        Ok(Self { camera, features: goal.len(), servo: Servo::new(&goal, filter, law, safety) })
-    }
-
-    fn step(&mut self, points: &Bound<'_, PyAny>) -> PyResult<Command> {
-        let points: Vec<[f64; 2]> = arrays::rows("points", points)?;
-        if points.len() != self.features {
-            let (found, expected) = (points.len(), self.features);
-            return Err(ShapeMismatch::new_err(format!(
-                "points has {found} rows, expected {expected} as goal, NaN for features that are not seen"
-            )));
-        }
-        let features: Vec<_> = points.iter().map(|&p| on_plane(self.camera.as_ref(), p)).collect();
-        Ok(Command(self.servo.step(&features)))
-    }
-}
-
-/// A pixel, or a point given so, on the plane z = 1.
-fn on_plane(camera: Option<&quest_core::Camera>, point: [f64; 2]) -> Option<[f64; 2]> {
-    let Some(camera) = camera else { return Some(point).filter(|p| p.iter().all(|c| c.is_finite())) };
-    let ray = camera.bearing(point).ok()?;
-    (ray.z > 0.0).then(|| [ray.x / ray.z, ray.y / ray.z])
-}
+pub(crate) use self::command::{_command, Command};
+use self::given::{Given, Loop, positive};
+use crate::errors::QuestError;
 
 /// A controller that moves a free camera, on an arm or a quadrotor, to where the goal image was taken.
 ///
@@ -201,19 +22,39 @@ fn on_plane(camera: Option<&quest_core::Camera>, point: [f64; 2]) -> Option<[f64
 ///     The camera, or its matrix K.
 /// max_speed, max_turn_rate : float
 ///     Limits of the commands in m/s and rad/s. Both parts are slowed alike, so that the path stays the same.
+/// max_acceleration, max_turn_acceleration : float, optional
+///     How fast the commands may change, in m/s² and rad/s²: twice the limits where not given, so that full speed comes after
+///     half a second. ``inf`` for at once.
 /// noise : float
 ///     Standard deviation of the coordinates of a feature: in pixels, or on the plane z = 1 without a camera.
 /// goal_images : int
 ///     How many images the goal's features are the mean of.
 /// period : float
 ///     Seconds from one call of ``step`` to the next.
-/// unit : float
-///     About how far the features are from the goal, in metres. A wrong guess makes the translation faster or
+/// unit : float, optional
+///     About how far the features are from the goal, in metres: 1 where neither it nor depths are given. A wrong guess makes the translation faster or
 ///     slower than the rotation, no more.
 /// rate : float
 ///     How fast both errors decay, in 1/s.
 /// depths : array_like of shape (N,), optional
-///     The depths of the features at the goal where they are known, in any unit.
+///     The depths of the features at the goal, NaN where one is not known. In metres they set ``unit`` where it is not given;
+///     with a ``unit`` they may be in any unit.
+/// depth_precision : float or array_like of shape (N,), optional
+///     The relative standard deviation of the depths, one for all or one each; 0.02 where not given.
+/// explore : float
+///     How far the loop may move to the side where the images show no parallax, as a share of the depth: 0.04 suits most
+///     scenes. Without it a start next to the goal only turns, and ``advice`` says why.
+/// tolerance, angle_tolerance, arrival_time : float
+///     ``arrived`` is true within so many metres (with ``unit``) and degrees, after so many seconds there.
+/// coasting_images : int
+///     For so many images without a pose the last command goes on.
+/// largest_gap : float
+///     An image that is older than so many seconds, by ``now`` of ``step``, is stale. ``idle`` stops after as long.
+/// axes : sequence of str, optional
+///     Which motions of the camera are free: ``"x"``, ``"y"``, ``"z"`` along its axes and ``"rx"``, ``"ry"``, ``"rz"`` about
+///     them. All six where not given.
+/// camera_in_hand : array_like of shape (4, 4), optional
+///     Takes points of the camera's frame to the hand's, in metres. Commands are then for the hand's frame.
 /// solver : str, optional
 ///     One of the names in ``solvers()``.
 ///
@@ -229,36 +70,58 @@ pub(crate) struct CameraServo(Loop<FreeCameraLaw>);
 #[pymethods]
 impl CameraServo {
     #[new]
-    #[pyo3(signature = (goal, camera=None, *, max_speed, max_turn_rate, noise, goal_images=1, period=0.1, unit=1.0, rate=0.5, depths=None, solver=None))]
+    #[pyo3(signature = (goal, camera=None, *, max_speed, max_turn_rate, max_acceleration=None, max_turn_acceleration=None, noise, goal_images=1, period=0.1, unit=None, rate=0.5, depths=None, depth_precision=None, explore=0.0, tolerance=0.01, angle_tolerance=0.5, arrival_time=0.5, coasting_images=1, largest_gap=0.5, axes=None, camera_in_hand=None, solver=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         goal: &Bound<'_, PyAny>,
         camera: Option<&Bound<'_, PyAny>>,
         max_speed: f64,
         max_turn_rate: f64,
+        max_acceleration: Option<f64>,
+        max_turn_acceleration: Option<f64>,
         noise: f64,
         goal_images: u32,
         period: f64,
-        unit: f64,
+        unit: Option<f64>,
         rate: f64,
         depths: Option<&Bound<'_, PyAny>>,
+        depth_precision: Option<&Bound<'_, PyAny>>,
+        explore: f64,
+        tolerance: f64,
+        angle_tolerance: f64,
+        arrival_time: f64,
+        coasting_images: usize,
+        largest_gap: f64,
+        axes: Option<Vec<String>>,
+        camera_in_hand: Option<&Bound<'_, PyAny>>,
         solver: Option<&str>,
     ) -> PyResult<Self> {
-        let limits = (max_speed, max_turn_rate);
+        let mount = camera_in_hand.map(|m| given::transform("camera_in_hand", m)).transpose()?;
+        let mount = mount.map_or(Mount::Camera, Mount::Hand);
+        let axes = axes.map_or(Ok(Axes::default()), |names| named_axes(&names))?;
         let given = Given {
             goal,
             camera,
-            limits,
+            limits: (max_speed, max_turn_rate),
+            acceleration: (max_acceleration, max_turn_acceleration),
             noise,
             goal_images,
             period,
             unit,
             depths,
+            depth_precision,
             solver,
             plane: None,
             border: 0.0,
+            explore,
+            coasting_images,
+            largest_gap,
+            arrival: (tolerance, angle_tolerance, arrival_time),
+            mount,
+            axes,
         };
-        Loop::new(&given, FreeCameraLaw { rate: positive("rate", rate)?, unit }).map(Self)
+        let rate = positive("rate", rate)?;
+        Loop::new(&given, |unit| Ok(FreeCameraLaw { rate, unit })).map(Self)
     }
 
     /// The command for one image.
@@ -267,20 +130,125 @@ impl CameraServo {
     /// ----------
     /// points : array_like of shape (N, 2)
     ///     The same features now, in the order of ``goal``; NaN for those that are not seen.
+    /// stamp : float, optional
+    ///     When the image was taken, in seconds; one period after the last one where not given. An image that is not later
+    ///     than the last one is stale.
+    /// now : float, optional
+    ///     The present on the same clock, to see whether the image is too old.
     ///
     /// Returns
     /// -------
     /// Command
-    ///     Velocities within the limits; zero while the loop holds.
-    #[pyo3(signature = (points, /))]
-    fn step(&mut self, points: &Bound<'_, PyAny>) -> PyResult<Command> {
-        self.0.step(points)
+    ///     Velocities within the limits; towards zero while the loop holds.
+    #[pyo3(signature = (points, /, stamp=None, now=None))]
+    fn step(&mut self, points: &Bound<'_, PyAny>, stamp: Option<f64>, now: Option<f64>) -> PyResult<Command> {
+        self.0.step(points, stamp, now)
     }
+
+    /// What to do where no image comes: the linear and the angular velocity, which go to zero once the last image is
+    /// ``largest_gap`` old.
+    ///
+    /// Parameters
+    /// ----------
+    /// now : float
+    ///     The present, on the clock of the stamps.
+    #[pyo3(signature = (now, /))]
+    fn idle<'py>(
+        &mut self,
+        py: Python<'py>,
+        now: f64,
+    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let twist = self.0.servo.idle(now);
+        (twist.linear.as_slice().to_pyarray(py), twist.angular.as_slice().to_pyarray(py))
+    }
+
+    /// Forgets everything but the goal and the depths that were given.
+    fn reset(&mut self) {
+        self.0.servo.reset();
+    }
+
+    /// The depths of the features at the goal as they are known now.
+    ///
+    /// Returns
+    /// -------
+    /// depths, precision : numpy.ndarray of shape (N,)
+    ///     In metres if ``unit`` is exact, and their relative standard deviations; NaN for what is not known. What
+    ///     ``set_depths`` takes.
+    fn depths<'py>(&mut self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let (depths, precision) = self.0.depths();
+        (depths.to_pyarray(py), precision.to_pyarray(py))
+    }
+
+    /// Starts anew with depths that are known: from an earlier run, or another sensor.
+    ///
+    /// Parameters
+    /// ----------
+    /// depths : array_like of shape (N,)
+    ///     In the unit of those given at the start, NaN where one is not known.
+    /// precision : float or array_like of shape (N,)
+    ///     Their relative standard deviations.
+    #[pyo3(signature = (depths, /, precision=None))]
+    fn set_depths(
+        &mut self,
+        depths: &Bound<'_, PyAny>,
+        precision: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        self.0.set_depths(depths, precision)
+    }
+
+    /// float : The unit of ``t`` in metres: as given, or the harmonic mean of the depths.
+    #[getter]
+    fn unit(&mut self) -> f64 {
+        self.0.servo.rig_mut().unit
+    }
+
+    /// float : The largest speed, in m/s. It can be set.
+    #[getter]
+    fn get_max_speed(&mut self) -> f64 {
+        self.0.servo.safety_mut().limits.speed
+    }
+
+    #[setter]
+    fn set_max_speed(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.safety_mut().limits.speed = positive("max_speed", value)?;
+        Ok(())
+    }
+
+    /// float : The largest turn rate, in rad/s. It can be set.
+    #[getter]
+    fn get_max_turn_rate(&mut self) -> f64 {
+        self.0.servo.safety_mut().limits.turn_rate
+    }
+
+    #[setter]
+    fn set_max_turn_rate(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.safety_mut().limits.turn_rate = positive("max_turn_rate", value)?;
+        Ok(())
+    }
+
+    /// float : How fast both errors decay, in 1/s. It can be set.
+    #[getter]
+    fn get_rate(&self) -> f64 {
+        self.0.servo.law().rate
+    }
+
+    #[setter]
+    fn set_rate(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.law_mut().rate = positive("rate", value)?;
+        Ok(())
+    }
+}
+
+/// Axes by their names.
+fn named_axes(names: &[String]) -> PyResult<Axes> {
+    Axes::from_names(names.iter().map(String::as_str)).map_err(|name| {
+        QuestError::new_err(format!("axes has {name:?}, expected one of {}", Axes::NAMES.join(", ")))
+    })
 }
 
 /// A controller that drives a robot with two driven wheels to where the goal image was taken.
 ///
-/// The camera looks ahead, levelled, above the axle.
+/// The camera looks ahead, levelled, above the axle, unless ``camera_in_base`` says otherwise.
 ///
 /// Parameters
 /// ----------
@@ -291,14 +259,17 @@ impl CameraServo {
 ///     The camera, or its matrix K. With the size of its image the robot keeps features inside.
 /// max_speed, max_turn_rate : float
 ///     Limits of the commands in m/s and rad/s.
+/// max_acceleration, max_turn_acceleration : float, optional
+///     How fast the commands may change, in m/s² and rad/s²: twice the limits where not given, so that full speed comes after
+///     half a second. ``inf`` for at once.
 /// noise : float
 ///     Standard deviation of the coordinates of a feature: in pixels, or on the plane z = 1 without a camera.
 /// goal_images : int
 ///     How many images the goal's features are the mean of.
 /// period : float
 ///     Seconds from one call of ``step`` to the next.
-/// unit : float
-///     About how far the features are from the goal, in metres.
+/// unit : float, optional
+///     About how far the features are from the goal, in metres: 1 where neither it nor depths are given.
 /// speed_gain, turn_gain : float
 ///     The gains k1 in m/s and k2 in rad/s of the paper's appendix C; ``turn_gain > speed_gain / unit`` makes the
 ///     law converge, twice as much is well.
@@ -307,7 +278,22 @@ impl CameraServo {
 /// border : float
 ///     Features within so many pixels of the left and right border are brought back.
 /// depths : array_like of shape (N,), optional
-///     The depths of the features at the goal where they are known, in any unit.
+///     The depths of the features at the goal, NaN where one is not known. In metres they set ``unit`` where it is not given;
+///     with a ``unit`` they may be in any unit.
+/// depth_precision : float or array_like of shape (N,), optional
+///     The relative standard deviation of the depths, one for all or one each; 0.02 where not given.
+/// explore : float
+///     How far the loop may move to the side where the images show no parallax, as a share of the depth: 0.04 suits most
+///     scenes. Without it a start next to the goal only turns, and ``advice`` says why.
+/// tolerance, angle_tolerance, arrival_time : float
+///     ``arrived`` is true within so many metres (with ``unit``) and degrees, after so many seconds there.
+/// coasting_images : int
+///     For so many images without a pose the last command goes on.
+/// largest_gap : float
+///     An image that is older than so many seconds, by ``now`` of ``step``, is stale. ``idle`` stops after as long.
+/// camera_in_base : (forward, height, tilt) or array_like of shape (4, 4), optional
+///     Where the camera is: metres ahead of the axle and above it, radians by which it looks down; or the matrix that takes
+///     points of the camera's frame to the base's (x to the right, y down, z forward).
 /// solver : str, optional
 ///     One of the names in ``solvers()``.
 ///
@@ -322,48 +308,214 @@ pub(crate) struct RobotServo(Loop<DifferentialDriveLaw>);
 #[pymethods]
 impl RobotServo {
     #[new]
-    #[pyo3(signature = (goal, camera=None, *, max_speed, max_turn_rate, noise, goal_images=1, period=0.1, unit=1.0, speed_gain=0.5, turn_gain=1.0, tilt=0.01, border=40.0, depths=None, solver=None))]
+    #[pyo3(signature = (goal, camera=None, *, max_speed, max_turn_rate, max_acceleration=None, max_turn_acceleration=None, noise, goal_images=1, period=0.1, unit=None, speed_gain=0.5, turn_gain=1.0, tilt=0.01, border=40.0, depths=None, depth_precision=None, explore=0.0, tolerance=0.01, angle_tolerance=0.5, arrival_time=0.5, coasting_images=1, largest_gap=0.5, camera_in_base=None, solver=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         goal: &Bound<'_, PyAny>,
         camera: Option<&Bound<'_, PyAny>>,
         max_speed: f64,
         max_turn_rate: f64,
+        max_acceleration: Option<f64>,
+        max_turn_acceleration: Option<f64>,
         noise: f64,
         goal_images: u32,
         period: f64,
-        unit: f64,
+        unit: Option<f64>,
         speed_gain: f64,
         turn_gain: f64,
         tilt: f64,
         border: f64,
         depths: Option<&Bound<'_, PyAny>>,
+        depth_precision: Option<&Bound<'_, PyAny>>,
+        explore: f64,
+        tolerance: f64,
+        angle_tolerance: f64,
+        arrival_time: f64,
+        coasting_images: usize,
+        largest_gap: f64,
+        camera_in_base: Option<&Bound<'_, PyAny>>,
         solver: Option<&str>,
     ) -> PyResult<Self> {
-        let limits = (max_speed, max_turn_rate);
         let (k1, k2) = (positive("speed_gain", speed_gain)?, positive("turn_gain", turn_gain)?);
-        if k2 <= k1 / positive("unit", unit)? {
-            let least = k1 / unit;
-            return Err(QuestError::new_err(format!(
-                "turn_gain is {k2}, expected more than speed_gain / unit = {least}: the law would not converge"
-            )));
-        }
         let tilt = positive("tilt", tilt)?;
         let plane = Some(Plane { tilt, height: 0.5 * tilt });
-        let given =
-            Given { goal, camera, limits, noise, goal_images, period, unit, depths, solver, plane, border };
-        Loop::new(&given, DifferentialDriveLaw::new(k1, k2)).map(Self)
+        let mount = camera_in_base.map_or(Ok(Mount::Camera), base_mount)?;
+        let axes = Axes::default();
+        let given = Given {
+            goal,
+            camera,
+            limits: (max_speed, max_turn_rate),
+            acceleration: (max_acceleration, max_turn_acceleration),
+            noise,
+            goal_images,
+            period,
+            unit,
+            depths,
+            depth_precision,
+            solver,
+            plane,
+            border,
+            explore,
+            coasting_images,
+            largest_gap,
+            arrival: (tolerance, angle_tolerance, arrival_time),
+            mount,
+            axes,
+        };
+        let law = |unit: f64| {
+            let least = k1 / unit;
+            if k2 > least {
+                return Ok(DifferentialDriveLaw::new(k1, k2));
+            }
+            Err(QuestError::new_err(format!(
+                "turn_gain is {k2}, expected more than speed_gain / unit = {least}: the law would not converge"
+            )))
+        };
+        Loop::new(&given, law).map(Self)
     }
 
-    /// The command for one image; see ``CameraServo.step``.
-    #[pyo3(signature = (points, /))]
-    fn step(&mut self, points: &Bound<'_, PyAny>) -> PyResult<Command> {
-        self.0.step(points)
+    /// The command for one image.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array_like of shape (N, 2)
+    ///     The same features now, in the order of ``goal``; NaN for those that are not seen.
+    /// stamp : float, optional
+    ///     When the image was taken, in seconds; one period after the last one where not given. An image that is not later
+    ///     than the last one is stale.
+    /// now : float, optional
+    ///     The present on the same clock, to see whether the image is too old.
+    ///
+    /// Returns
+    /// -------
+    /// Command
+    ///     Velocities within the limits; towards zero while the loop holds.
+    #[pyo3(signature = (points, /, stamp=None, now=None))]
+    fn step(&mut self, points: &Bound<'_, PyAny>, stamp: Option<f64>, now: Option<f64>) -> PyResult<Command> {
+        self.0.step(points, stamp, now)
+    }
+
+    /// What to do where no image comes: the linear and the angular velocity, which go to zero once the last image is
+    /// ``largest_gap`` old.
+    ///
+    /// Parameters
+    /// ----------
+    /// now : float
+    ///     The present, on the clock of the stamps.
+    #[pyo3(signature = (now, /))]
+    fn idle<'py>(
+        &mut self,
+        py: Python<'py>,
+        now: f64,
+    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let twist = self.0.servo.idle(now);
+        (twist.linear.as_slice().to_pyarray(py), twist.angular.as_slice().to_pyarray(py))
+    }
+
+    /// Forgets everything but the goal and the depths that were given.
+    fn reset(&mut self) {
+        self.0.servo.reset();
+    }
+
+    /// The depths of the features at the goal as they are known now.
+    ///
+    /// Returns
+    /// -------
+    /// depths, precision : numpy.ndarray of shape (N,)
+    ///     In metres if ``unit`` is exact, and their relative standard deviations; NaN for what is not known. What
+    ///     ``set_depths`` takes.
+    fn depths<'py>(&mut self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let (depths, precision) = self.0.depths();
+        (depths.to_pyarray(py), precision.to_pyarray(py))
+    }
+
+    /// Starts anew with depths that are known: from an earlier run, or another sensor.
+    ///
+    /// Parameters
+    /// ----------
+    /// depths : array_like of shape (N,)
+    ///     In the unit of those given at the start, NaN where one is not known.
+    /// precision : float or array_like of shape (N,)
+    ///     Their relative standard deviations.
+    #[pyo3(signature = (depths, /, precision=None))]
+    fn set_depths(
+        &mut self,
+        depths: &Bound<'_, PyAny>,
+        precision: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        self.0.set_depths(depths, precision)
+    }
+
+    /// float : The unit of ``t`` in metres: as given, or the harmonic mean of the depths.
+    #[getter]
+    fn unit(&mut self) -> f64 {
+        self.0.servo.rig_mut().unit
+    }
+
+    /// float : The largest speed, in m/s. It can be set.
+    #[getter]
+    fn get_max_speed(&mut self) -> f64 {
+        self.0.servo.safety_mut().limits.speed
+    }
+
+    #[setter]
+    fn set_max_speed(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.safety_mut().limits.speed = positive("max_speed", value)?;
+        Ok(())
+    }
+
+    /// float : The largest turn rate, in rad/s. It can be set.
+    #[getter]
+    fn get_max_turn_rate(&mut self) -> f64 {
+        self.0.servo.safety_mut().limits.turn_rate
+    }
+
+    #[setter]
+    fn set_max_turn_rate(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.safety_mut().limits.turn_rate = positive("max_turn_rate", value)?;
+        Ok(())
+    }
+
+    /// float : The gain k1, in m/s. It can be set.
+    #[getter]
+    fn get_speed_gain(&self) -> f64 {
+        self.0.servo.law().speed_gain
+    }
+
+    #[setter]
+    fn set_speed_gain(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.law_mut().speed_gain = positive("speed_gain", value)?;
+        Ok(())
+    }
+
+    /// float : The gain k2, in rad/s. It can be set.
+    #[getter]
+    fn get_turn_gain(&self) -> f64 {
+        self.0.servo.law().turn_gain
+    }
+
+    #[setter]
+    fn set_turn_gain(&mut self, value: f64) -> PyResult<()> {
+        self.0.servo.law_mut().turn_gain = positive("turn_gain", value)?;
+        Ok(())
     }
 
     /// bool : Whether the robot has arrived, and only turns to the goal's heading.
     #[getter]
     fn has_arrived(&self) -> bool {
         self.0.servo.law().has_arrived()
+    }
+}
+
+/// Three numbers, or a matrix.
+fn base_mount(given: &Bound<'_, PyAny>) -> PyResult<Mount> {
+    match given.extract::<(f64, f64, f64)>() {
+        Ok((forward, height, tilt)) if [forward, height, tilt].iter().all(|x| x.is_finite()) => {
+            Ok(Mount::ahead(forward, height, tilt))
+        }
+        Ok(numbers) => {
+            Err(QuestError::new_err(format!("camera_in_base is {numbers:?}, expected finite numbers")))
+        }
+        Err(_) => given::transform("camera_in_base", given).map(Mount::Base),
     }
 }

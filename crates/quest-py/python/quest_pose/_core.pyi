@@ -29,6 +29,7 @@ __all__ = [
     "_colmap_read_pairs",
     "_colmap_verify",
     "_colmap_write",
+    "_command",
     "_estimate",
     "_estimate_batch",
     "_runner_up",
@@ -363,14 +364,56 @@ class Command:
     def state(
         self,
     ) -> Literal[
-        "tracking", "starting", "too_few_features", "degenerate", "inconsistent", "jump", "uncertain"
+        "tracking",
+        "rotation_only",
+        "exploring",
+        "ambiguous",
+        "coasting",
+        "starting",
+        "too_few_features",
+        "degenerate",
+        "inconsistent",
+        "jump",
+        "uncertain",
+        "diverging",
+        "stale",
     ]: ...
+    @property
+    def advice(self) -> str: ...
     @property
     def R(self) -> _Array | None: ...
     @property
     def t(self) -> _Array | None: ...
     @property
+    def covariance(self) -> _Array | None: ...
+    @property
+    def residual(self) -> float | None: ...
+    @property
     def inliers(self) -> int: ...
+    @property
+    def inlier_mask(self) -> _Bools: ...
+    @property
+    def seen(self) -> int: ...
+    @property
+    def hypotheses(self) -> int: ...
+    @property
+    def image(self) -> int: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def holding_images(self) -> int: ...
+    @property
+    def holding_seconds(self) -> float: ...
+    @property
+    def restarts(self) -> int: ...
+    @property
+    def arrived(self) -> bool: ...
+    @property
+    def border_limits(self) -> bool: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+def _command(state: tuple[Any, ...]) -> Command: ...
 
 @final
 class CameraServo:
@@ -381,15 +424,35 @@ class CameraServo:
         *,
         max_speed: float,
         max_turn_rate: float,
+        max_acceleration: float | None = None,
+        max_turn_acceleration: float | None = None,
         noise: float,
         goal_images: int = 1,
         period: float = 0.1,
-        unit: float = 1.0,
+        unit: float | None = None,
         rate: float = 0.5,
         depths: ArrayLike | None = None,
+        depth_precision: ArrayLike | None = None,
+        explore: float = 0.0,
+        tolerance: float = 0.01,
+        angle_tolerance: float = 0.5,
+        arrival_time: float = 0.5,
+        coasting_images: int = 1,
+        largest_gap: float = 0.5,
+        axes: Sequence[str] | None = None,
+        camera_in_hand: ArrayLike | None = None,
         solver: str | None = None,
     ) -> CameraServo: ...
-    def step(self, points: ArrayLike, /) -> Command: ...
+    def step(self, points: ArrayLike, /, stamp: float | None = None, now: float | None = None) -> Command: ...
+    def idle(self, now: float, /) -> tuple[_Array, _Array]: ...
+    def reset(self) -> None: ...
+    def depths(self) -> tuple[_Array, _Array]: ...
+    def set_depths(self, depths: ArrayLike, /, precision: ArrayLike | None = None) -> None: ...
+    @property
+    def unit(self) -> float: ...
+    max_speed: float
+    max_turn_rate: float
+    rate: float
 
 @final
 class RobotServo:
@@ -400,18 +463,38 @@ class RobotServo:
         *,
         max_speed: float,
         max_turn_rate: float,
+        max_acceleration: float | None = None,
+        max_turn_acceleration: float | None = None,
         noise: float,
         goal_images: int = 1,
         period: float = 0.1,
-        unit: float = 1.0,
+        unit: float | None = None,
         speed_gain: float = 0.5,
         turn_gain: float = 1.0,
         tilt: float = 0.01,
         border: float = 40.0,
         depths: ArrayLike | None = None,
+        depth_precision: ArrayLike | None = None,
+        explore: float = 0.0,
+        tolerance: float = 0.01,
+        angle_tolerance: float = 0.5,
+        arrival_time: float = 0.5,
+        coasting_images: int = 1,
+        largest_gap: float = 0.5,
+        camera_in_base: tuple[float, float, float] | ArrayLike | None = None,
         solver: str | None = None,
     ) -> RobotServo: ...
-    def step(self, points: ArrayLike, /) -> Command: ...
+    def step(self, points: ArrayLike, /, stamp: float | None = None, now: float | None = None) -> Command: ...
+    def idle(self, now: float, /) -> tuple[_Array, _Array]: ...
+    def reset(self) -> None: ...
+    def depths(self) -> tuple[_Array, _Array]: ...
+    def set_depths(self, depths: ArrayLike, /, precision: ArrayLike | None = None) -> None: ...
+    @property
+    def unit(self) -> float: ...
+    max_speed: float
+    max_turn_rate: float
+    speed_gain: float
+    turn_gain: float
     @property
     def has_arrived(self) -> bool: ...
 def _colmap_verify(
