@@ -9,8 +9,8 @@ use quest_benches::SEED;
 use quest_benches::statistics::{percentile, sorted};
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
-    Choice, ControlLaw, DepthFilter, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw,
-    Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Safety, Servo,
+    Choice, ControlLaw, DifferentialDriveLaw, Disturbances, FilterOptions, FreeCameraLaw, Length, Limits,
+    PerFrame, Plane, Plant, PoseEstimator, Rig, Safety, Servo, Sticky, Tracker,
 };
 use quest_core::solver::SolverName;
 use rand_chacha::ChaCha8Rng;
@@ -49,6 +49,46 @@ fn main() {
             rows("arm", &arguments, &images, &law, None, scenario::random_camera);
         }
     }
+    many(&arguments);
+}
+
+/// A thousand features of the goal, three hundred of them in each image, three in ten of those wrong.
+fn many(arguments: &Arguments) {
+    const GOAL: usize = 1_000;
+    const SEEN: usize = 300;
+    let mut times = Times::default();
+    for run in 0..arguments.runs.clamp(1, 5) {
+        let rng = &mut scenario::generator(arguments.seed, run);
+        let disturbances = Disturbances {
+            noise_px: 0.5,
+            sticky: Some(Sticky { share: 0.3, images: 20.0 }),
+            ..Disturbances::default()
+        };
+        let mut world = scenario::robot_world(Features::General, GOAL, disturbances, rng);
+        world.points.iter_mut().for_each(|x| (x.x, x.y) = (0.6 * x.x, 0.6 * x.y));
+        let mut plant = scenario::robot_start(Features::General);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let options = world.filter_options(&LIMITS, 2.0);
+        let law = FreeCameraLaw { rate: 0.3, unit: 2.0 };
+        let rig = Rig { unit: 2.0, ..Rig::default() };
+        let tracker = Tracker::new(&goal, SolverName::Quest, options);
+        let servo = Servo::new(&goal, tracker, law, Safety::new(LIMITS)).with_rig(rig);
+        let mut images = Vec::new();
+        world.run(&mut plant, &mut servo.clone(), IMAGES, rng, |record| {
+            let mut image = record.features.clone();
+            // Others in each image, most of them the same as in the last.
+            let first = 3 * images.len() % GOAL;
+            for (k, feature) in image.iter_mut().enumerate() {
+                if (k + GOAL - first) % GOAL >= SEEN {
+                    *feature = None;
+                }
+            }
+            images.push(image);
+            true
+        });
+        times.add(&servo, &images, arguments.rounds.min(5));
+    }
+    times.report("arm, 300 of 1,000 features, 30 % wrong", "map of the goal");
 }
 
 /// What the images show.
@@ -79,24 +119,25 @@ fn rows<P: Plant, L: ControlLaw + Clone>(
         // As in the tables of the closed loop.
         let min_features = if plane.is_some() && features < 20 { 4 } else { 5 };
         let options = FilterOptions { plane, min_features, ..world.filter_options(&LIMITS, 2.0) };
-        let filter = DepthFilter::new(&goal, SolverName::Quest, options);
+        let tracker = Tracker::new(&goal, SolverName::Quest, options);
         let mut choice = PerFrame::new(&goal, SolverName::Quest, Choice::Reprojection, Length::GoalDepths);
         choice.set_depths(&world.points.iter().map(|x| x.z).collect::<Vec<_>>());
         let safety = Safety { border: plane.and(world.border(40.0)), ..Safety::new(LIMITS) };
-        let filter = Servo::new(&goal, filter, law.clone(), safety);
+        let rig = Rig { unit: 2.0, ..Rig::default() };
+        let tracker = Servo::new(&goal, tracker, law.clone(), safety).with_rig(rig);
         let choice = Servo::new(&goal, choice, law.clone(), safety);
         let mut images = Vec::new();
-        world.run(&mut plant, &mut filter.clone(), IMAGES, rng, |record| {
+        world.run(&mut plant, &mut tracker.clone(), IMAGES, rng, |record| {
             images.push(record.features.clone());
             true
         });
-        filtered.add(&filter, &images, arguments.rounds);
+        filtered.add(&tracker, &images, arguments.rounds);
         chosen.add(&choice, &images, arguments.rounds);
     }
     let disturbed =
         if outliers > 0.0 { format!(", {:.0} % outliers", 100.0 * outliers) } else { String::new() };
     let name = format!("{body}, {features} features{disturbed}");
-    filtered.report(&name, "filter");
+    filtered.report(&name, "map of the goal");
     if outliers == 0.0 {
         chosen.report(&name, "one candidate an image");
     }

@@ -14,6 +14,8 @@ pub(crate) enum Body {
 /// How poses are made of images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Method {
+    /// The map of the goal's features.
+    Tracker,
     /// The filter on the goal's depths.
     Filter,
     /// One candidate of each image, the goal's depths being known.
@@ -48,7 +50,7 @@ impl Cell {
             goal_images: 1,
             known_depths: false,
             plane: body == Body::Robot,
-            method: Method::Filter,
+            method: Method::Tracker,
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod bound;
 mod cells;
+mod planted;
 mod run;
 
 use std::convert::Infallible;
@@ -11,7 +12,7 @@ use clap::Parser;
 use quest_benches::statistics::{percentile, sorted};
 use quest_benches::{SEED, parallel};
 
-use cells::cells;
+use cells::{Method, cells};
 use run::{End, Outcome};
 
 /// The closed loop from many starts.
@@ -26,6 +27,12 @@ struct Arguments {
     /// Only cells whose name contains this
     #[arg(long, default_value = "")]
     cell: String,
+    /// The table of what goes wrong in a laboratory in place of the paper's
+    #[arg(long)]
+    planted: bool,
+    /// With the filter in place of the tracker
+    #[arg(long)]
+    filter: bool,
     /// Threads; the numbers do not depend on it
     #[arg(long, default_value_t = parallel::all_cores())]
     threads: usize,
@@ -37,11 +44,19 @@ struct Arguments {
 fn main() {
     let arguments = Arguments::parse();
     println!("{} starts a cell, seed {}\n", arguments.starts, arguments.seed);
+    if arguments.planted {
+        let Arguments { starts, seed, cell, threads, filter, lost, .. } = &arguments;
+        planted::print_table(*starts, *seed, cell, *threads, *filter, *lost);
+        return;
+    }
     println!(
         "| cell | starts | 2 cm, 1° | resection | 5 cm, 2° | left image | held | inaccurate | astray | cm, median | 98 % | °, median | 98 % | holds a run | unsafe |"
     );
     println!("|---|{}", "---:|".repeat(14));
-    for cell in cells().iter().filter(|cell| cell.name.contains(&arguments.cell)) {
+    for cell in cells().iter_mut().filter(|cell| cell.name.contains(&arguments.cell)) {
+        if arguments.filter && cell.method == Method::Tracker {
+            cell.method = Method::Filter;
+        }
         let run = |index| Ok::<_, Infallible>(cell.run(arguments.seed, index));
         let Ok(outcomes) = parallel::map(arguments.starts, arguments.threads, run);
         print_row(&cell.name, &outcomes);

@@ -3,7 +3,7 @@
 use quest_core::servo::scenario;
 use quest_core::servo::{
     ControlLaw, DepthFilter, DifferentialDriveLaw, FilterOptions, FreeCameraLaw, Limits, PerFrame, Plane,
-    Plant, PoseEstimator, Safety, Servo, World,
+    Plant, PoseEstimator, Rig, Safety, Servo, Tracker, World,
 };
 use quest_core::solver::SolverName;
 use rand_chacha::ChaCha8Rng;
@@ -112,6 +112,13 @@ impl Cell {
                 }
                 self.drive(world, plant, law, &goal, filter, rng)
             }
+            Method::Tracker => {
+                let mut tracker = Tracker::new(&goal, SolverName::Quest, options);
+                if self.known_depths {
+                    tracker.set_depths(&depths, 0.02);
+                }
+                self.drive(world, plant, law, &goal, tracker, rng)
+            }
             Method::PerFrame(solver, choice, length) => {
                 let mut estimator = PerFrame::new(&goal, solver, choice, length);
                 estimator.set_depths(&depths);
@@ -132,7 +139,8 @@ impl Cell {
     ) -> Outcome {
         let mut safety = Safety::new(LIMITS);
         safety.border = world.border(BORDER).filter(|_| self.body == Body::Robot);
-        let mut servo = Servo::new(goal, estimator, law, safety);
+        let rig = Rig { unit: UNIT, ..Rig::default() };
+        let mut servo = Servo::new(goal, estimator, law, safety).with_rig(rig);
         let (mut holds, mut unsafe_commands, mut holds_now, mut still) = (0, 0, false, 0);
         world.run(&mut plant, &mut servo, IMAGES, rng, |record| {
             let command = record.step.command;
