@@ -97,7 +97,8 @@ pub struct Candidate {
     /// Root mean square over the matches, in radians, of the angle by which each bearing of a match would
     /// have to turn to satisfy the epipolar constraint (the Sampson error on the sphere).
     pub residual: f64,
-    /// How many of the matches have positive depth in both views.
+    /// How many of the matches have positive depth in both views. With more than five matches those whose rays are parallel to
+    /// within the noise that the residual shows, points so far away that the sign of their depth is chance, count as well.
     pub in_front: usize,
 }
 

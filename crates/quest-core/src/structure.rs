@@ -123,6 +123,32 @@ pub(crate) fn two_pairs_with_depths(
     [tally.completed(q_21, direction, matches), twisted.completed(&twin, direction, matches)]
 }
 
+/// The same pose, its points counted and the sign of its translation chosen with the noise in mind: a match whose rays are closer to
+/// parallel than its noise, as much as the residual says, has a depth of either sign by chance, and counts as in front where the rays
+/// point the same way.
+pub(crate) fn with_noise(found: &Completed, matches: &[Correspondence]) -> Completed {
+    let r_21 = found.pose.q_21.to_rotation_matrix();
+    let parallel = PARALLEL.max(CLEAR * std::f64::consts::SQRT_2 * found.residual);
+    let (mut front, mut behind, mut far) = (0, 0, 0);
+    for m in matches {
+        let (b, c) = (m.bearing2(), r_21 * m.bearing1());
+        let normal = b.cross(&c);
+        let depths = [c, *b].map(|x| -x.cross(&found.pose.t_21).dot(&normal));
+        if b.dot(&c) > 0.0 && normal.norm() <= parallel {
+            far += 1;
+        } else if depths.iter().all(|z| *z > 0.0) {
+            front += 1;
+        } else if depths.iter().all(|z| *z < 0.0) {
+            behind += 1;
+        }
+    }
+    let pose = if behind > front { RelativePose::new(found.pose.q_21, -found.pose.t_21) } else { found.pose };
+    Completed { pose, in_front: far + front.max(behind), ..*found }
+}
+
+/// A depth stands clear of its noise where the angle between the rays is more than this many times the noise of both.
+const CLEAR: f64 = 4.0;
+
 /// What is needed of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: two matches, or one match after
 /// two rotations.
 struct Rays {
@@ -325,5 +351,37 @@ mod tests {
         let Completed { pose, in_front, .. } =
             with_depths(truth.q_21, &truth.t_21.normalize(), &matches[5..]);
         assert_eq!((in_front, pose.t_21), (1, Vector3::zeros()));
+    }
+
+    #[test]
+    fn distant_points_are_in_front_whatever_noise_makes_of_their_depths() {
+        use crate::solver::{Kinds, SolverName};
+        use rand::{RngExt, SeedableRng};
+        let mut right = 0;
+        for index in 0..30 {
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+            rng.set_stream(index);
+            let mut number = |from: f64, to: f64| rng.random_range(from..to);
+            let mut vector = |size: f64| Vector3::from_fn(|_, _| number(-size, size));
+            let truth = RelativePose::new(UnitQuaternion::new(vector(0.03)), vector(1.0).normalize() * 0.2);
+            // A quarter of the points is near; half a pixel of a focal length of 1,000.
+            let matches: Vec<_> = (0..60)
+                .map(|i| {
+                    let z = if i % 4 == 0 { number(1.8, 3.6) } else { number(100.0, 400.0) };
+                    let x1 = Vector3::new(number(-0.4, 0.4), number(-0.3, 0.3), 1.0) * z;
+                    let x2 = truth.q_21 * x1 + truth.t_21;
+                    let mut seen = |x: &Vector3<f64>| [0, 1].map(|k| x[k] / x.z + number(-9e-4, 9e-4));
+                    Correspondence::from_image_points(seen(&x1), seen(&x2)).unwrap()
+                })
+                .collect();
+            let mut found = crate::Candidates::new();
+            SolverName::Quest.solve(Kinds::All, &matches, &mut found);
+            let best = found.iter().next().unwrap();
+            let direction = best.pose.translation_error(&truth).unwrap_or(std::f64::consts::PI);
+            right += usize::from(
+                best.in_front == 60 && best.pose.rotation_error(&truth) < 0.01 && direction < 0.1,
+            );
+        }
+        assert!(right >= 28, "{right}");
     }
 }

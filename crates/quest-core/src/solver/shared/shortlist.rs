@@ -11,7 +11,7 @@ use crate::solver::shared::gram::Gram;
 use crate::solver::shared::motion::{COARSE, FINE, Motion, Until};
 use crate::solver::shared::newton_pair::{TwoMotions, solution};
 use crate::solver::shared::parallax_frame::Alignment;
-use crate::structure::{Completed, two_pairs_with_depths, two_with_depths, with_depths};
+use crate::structure::{Completed, two_pairs_with_depths, two_with_depths, with_depths, with_noise};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -256,6 +256,7 @@ impl Shortlist {
                 let TwoMotions { q_21, direction } = TwoMotions::new(&two[0].motion, &two[1].motion);
                 let mut push = |completed: [Completed; 2]| {
                     for (item, completed) in two.iter().zip(completed).take(count) {
+                        let completed = in_noise(item.kind, completed, matches);
                         out.push(candidate(item.kind, &completed));
                     }
                 };
@@ -269,6 +270,17 @@ impl Shortlist {
             }
         }
         rank(out);
+    }
+}
+
+/// With its points counted with the noise in mind, where there are more than five: those that five matches have show none. A
+/// rotation alone takes parallax for noise.
+fn in_noise(kind: CandidateKind, completed: Completed, matches: &[Correspondence]) -> Completed {
+    let shows_noise = kind != CandidateKind::RotationOnly && matches.len() > 5;
+    if shows_noise && completed.in_front < matches.len() && completed.residual > ROUNDING {
+        with_noise(&completed, matches)
+    } else {
+        completed
     }
 }
 
