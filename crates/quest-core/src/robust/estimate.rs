@@ -13,8 +13,8 @@ pub enum Model {
     General,
     /// Points on a plane, a translation: there may be a second pose.
     Planar,
-    /// No translation that stands clear of the noise. The rotation is right; the translation is the small vector that is left,
-    /// of no meaning where it is within its covariance.
+    /// No translation is evident. The rotation and the covariance take into account that there may be a small one; the
+    /// translation is its mean, of no meaning where it is within its covariance.
     PureRotation,
 }
 
@@ -73,7 +73,8 @@ pub struct Estimate {
     /// the translation.
     #[cfg_attr(feature = "serde", serde(with = "crate::serial::rows"))]
     pub covariance: Matrix6<f64>,
-    /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order.
+    /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order. Of matches that
+    /// share a keypoint only the one that agrees best is, with its copies.
     pub inliers: Vec<bool>,
     /// How many of them there are.
     pub inlier_count: usize,
@@ -88,4 +89,13 @@ pub struct Estimate {
     pub evidence: Evidence,
     /// The standard deviation of the inliers' Sampson errors, in pixels of the focal lengths.
     pub noise_px: f64,
+    /// The normal of the plane in view 1 over its distance, in the scale of the pose: `R_21 + t_21 normalᵀ` takes points of view 1 to
+    /// view 2. Where the model is [`Model::Planar`] alone.
+    pub normal: Option<[f64; 3]>,
+    /// The share of false matches that the threshold accepts, measured on the points of view 1 with those of view 2 shifted
+    /// against them. Above some tenths the threshold is far too wide: is it in the unit of the points?
+    pub false_share: f64,
+    /// Matches that were set aside because they did not move at all while the others did: an overlay, dirt on the lens. The pose is
+    /// that of the others.
+    pub unmoved: usize,
 }

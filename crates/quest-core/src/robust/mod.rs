@@ -14,7 +14,9 @@
 //! ```
 //!
 //! # Steps
-//! 1. The matches are permuted once and written in columns of pixels (`data`).
+//! 1. The matches are permuted once and written in columns of pixels (`data`). Where matches share a keypoint, of which at most one
+//!    is true, one of them is kept: for the search any, after it the one that agrees best. A group of matches that did not move at
+//!    all is set aside where the others agree with a pose (`pipeline`).
 //! 2. Random samples are drawn, more of them from matches that move as their neighbours do (`search::guide`, `search::ranking`), and solved
 //!    (`search::hypotheses`). Their essential matrices are scored over all matches and dropped as soon as they are most likely worse
 //!    than the best (`search::search_score`); the best are scored as poses, with the depths of their points
@@ -23,8 +25,11 @@
 //! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`).
 //! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`conclude::plane`). The best is refined once
 //!    more without the matches that agree with it by chance (`conclude::chance_inliers`).
-//! 5. Whether chance explains the inliers (`conclude::false_alarms`), and which model they support (`conclude::model`).
-//! 6. The length of the translation and the covariance (`conclude::length`, `conclude::covariance`).
+//! 5. Whether chance explains the inliers (`conclude::false_alarms`). Where a rotation alone leaves little, the likelihood of all
+//!    matches decides which minimum is right, which matches agree by chance and whether there is a translation
+//!    (`conclude::small_motion`); the model is a description of that (`conclude::model`).
+//! 6. The length of the translation and the covariance (`conclude::length`, `conclude::covariance`); of a small motion both are those
+//!    of a mixture (`conclude::mixture`).
 //!
 //! # Noise
 //! Points that were given on the plane `z = 1` have the same noise everywhere in the image; bearings that were given otherwise,
@@ -39,13 +44,13 @@ mod conclude;
 mod data;
 mod estimate;
 mod options;
+mod pipeline;
 mod refine;
 mod search;
 #[cfg(test)]
 mod tests;
 mod third_view;
 
-use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 pub use batch::{Batch, Problem, estimate_batch};
@@ -58,6 +63,7 @@ use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, Degeneracy, InputError};
 use conclude::{Answer, false_alarms};
 use data::observations::Observations;
+use pipeline::Task;
 use search::{Draws, Limits, Search, hypotheses, sampling};
 
 /// Fewer matches than this have no pose.
@@ -111,29 +117,18 @@ fn answer(
 ) -> Result<Estimate, EstimateError> {
     options.check()?;
     priors.check(matches.len())?;
-    let needed = options.solver.info().min_matches.max(MIN_MATCHES);
-    if matches.len() < needed {
-        return Err(InputError::TooFewMatches { found: matches.len(), needed }.into());
-    }
-    let mut rng = sampling::generator(options.seed, options.index);
-    let mut order: Vec<usize> = (0..matches.len()).collect();
-    order.shuffle(&mut rng);
-    let observations = Observations::new(matches, order, options.focal_lengths, options.threshold);
-    let (mut poses, found) = search(&observations, options, priors, rng.clone(), is_cancelled).into_result();
-    if is_cancelled() {
-        return Err(EstimateError::Cancelled);
-    }
-    let found = found.ok_or_else(|| no_pose(&observations, 0))?;
-    conclude::conclude(&mut poses, &found, answer, options.max_false_alarms, &mut rng)
+    Task { matches, options, priors, answer, is_cancelled }.run()
 }
 
-/// Why there is no pose, when the best one has so many inliers: what is wrong with the matches, if anything is.
-fn no_pose(observations: &Observations, inliers: usize) -> EstimateError {
+/// Why there is no pose, when the best one has so many inliers and so large a share of false matches: what is wrong with the
+/// matches, if anything is.
+fn no_pose(observations: &Observations, inliers: usize, false_share: f64) -> EstimateError {
     let some = &observations.matches[..observations.len().min(DIAGNOSED)];
-    let otherwise = if observations.is_line(some) {
+    // Within a threshold as wide as the image all points are on a line.
+    let otherwise = if false_share < options::UNUSUAL && observations.is_line(some) {
         InputError::Degenerate(Degeneracy::Collinear).into()
     } else {
-        EstimateError::NoPose { inliers, matches: observations.len() }
+        EstimateError::NoPose { inliers, matches: observations.given, false_share }
     };
     degenerate(observations, otherwise)
 }

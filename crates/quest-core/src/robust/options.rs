@@ -147,19 +147,36 @@ pub enum EstimateError {
         expected: &'static str,
     },
     /// No pose explains more of the matches than chance would.
-    #[error(
-        "no pose could be found: the best one agrees with {inliers} of {matches} matches within the threshold, which \
-         chance explains"
-    )]
+    #[error("{}", describe_no_pose(*inliers, *matches, *false_share))]
     NoPose {
         /// Matches that agree with the best pose.
         inliers: usize,
         /// All matches.
         matches: usize,
+        /// The share of false matches that agree with it as well; see [`Estimate::false_share`](crate::robust::Estimate).
+        false_share: f64,
     },
     /// The caller ended the search.
     #[error("the search was ended before it had an answer")]
     Cancelled,
+}
+
+/// More false matches within the threshold than this are a sign that it is in another unit.
+pub(super) const UNUSUAL: f64 = 0.3;
+
+fn describe_no_pose(inliers: usize, matches: usize, false_share: f64) -> String {
+    let text = format!(
+        "no pose could be found: the best one agrees with {inliers} of {matches} matches within the threshold, which chance \
+         explains"
+    );
+    if false_share < UNUSUAL {
+        return text;
+    }
+    format!(
+        "{text}; the threshold accepts {:.0} % of false matches: is it in the unit of the points? With cameras it is in pixels, \
+         without them in units of the plane z = 1",
+        100.0 * false_share
+    )
 }
 
 impl Priors<'_> {

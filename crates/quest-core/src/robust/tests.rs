@@ -3,11 +3,14 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 
+use super::search::sampling;
 use super::*;
 use crate::lanes::SearchScore;
 use crate::simulate::{FOCAL_LENGTH, Layout, Motion as SceneMotion, Scene, SceneOptions};
 use crate::solver::SolverName;
 use crate::{Camera, CameraModel, RelativePose, correspondence};
+
+mod regimes;
 
 /// One seed for this file; every test takes its own indices.
 const SEED: u64 = 0x0b57;
@@ -116,8 +119,9 @@ fn a_camera_that_turns_in_place_has_a_rotation_and_no_translation() {
         assert!(found.pose.rotation_error(&scene.truth).to_degrees() < 0.2);
         assert!(found.pose.t_21.norm() < 0.02, "{}", found.pose.t_21.norm());
         assert!(found.runner_up.is_none());
-        // The translation is within its deviation of nothing.
-        assert!(found.covariance[(3, 3)].sqrt() > 0.5 * found.pose.t_21.norm());
+        // The translation is within a few of its deviations of nothing.
+        let deviation = found.covariance.fixed_view::<3, 3>(3, 3).trace().sqrt();
+        assert!(deviation > 0.25 * found.pose.t_21.norm(), "{index}");
     }
 }
 
@@ -146,12 +150,14 @@ fn the_unit_of_the_threshold_does_not_matter() {
             let threshold = options().threshold / FOCAL_LENGTH;
             let in_radians = Options { threshold, focal_lengths: [[1.0; 2]; 2], ..options() };
             let in_radians = estimate(matches, &in_radians).unwrap();
+            assert_eq!(in_radians.model, in_pixels.model, "{index}");
+            // Where there is no translation its direction is chance, and with it which matches at the threshold agree.
+            if in_pixels.model == Model::PureRotation {
+                assert!(in_radians.pose.rotation_error(&in_pixels.pose) < 2e-3, "{index}");
+                continue;
+            }
             // The search may come to the same optimum on another way, to its last step.
-            assert_eq!(
-                (in_radians.model, &in_radians.inliers),
-                (in_pixels.model, &in_pixels.inliers),
-                "{index}"
-            );
+            assert_eq!(in_radians.inliers, in_pixels.inliers, "{index}");
             assert!(in_radians.pose.rotation_error(&in_pixels.pose) < 1e-5, "{index}");
             assert!((in_radians.pose.t_21 - in_pixels.pose.t_21).norm() < 1e-4, "{index}");
             assert!((in_radians.noise_px * FOCAL_LENGTH / in_pixels.noise_px - 1.0).abs() < 1e-3, "{index}");
@@ -243,7 +249,7 @@ fn false_matches_have_no_pose() {
     for (points, index) in [(20, 70), (50, 71), (100, 72), (300, 73)] {
         let (scene, _) = scene(&noisy(points), 1.0, index);
         let refused = estimate(&scene.matches, &limits).unwrap_err();
-        let EstimateError::NoPose { inliers, matches } = refused else { panic!("{refused}") };
+        let EstimateError::NoPose { inliers, matches, .. } = refused else { panic!("{refused}") };
         assert!(matches == points && inliers < points, "{refused}");
         let anyhow = Options { max_false_alarms: f64::INFINITY, ..limits.clone() };
         let estimate = estimate(&scene.matches, &anyhow).unwrap();

@@ -34,7 +34,7 @@ const STEPS: usize = 10;
 const USUAL: f64 = 3.0;
 
 /// Among more inliers than this one false match has no weight.
-const ENOUGH: usize = 1_000;
+const ENOUGH: usize = 20_000;
 
 /// Refines a pose without the inliers that agree with it by chance.
 pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: Polished) -> Polished {

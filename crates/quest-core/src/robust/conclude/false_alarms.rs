@@ -1,7 +1,8 @@
 //! Whether a pose agrees with more matches, or more closely, than chance would let it.
 //!
 //! How often a false match comes within a distance `r` of agreeing with a pose is measured on false matches: the points of view 1
-//! with those of view 2 shifted against them. That probability is `α(r) = r α(1)`, a band along a line. Of `n` matches the `k`
+//! with those of view 2 shifted against them. That probability is `α(r) = r α(1)`, a band along a line, or what was measured at `r`
+//! where that is clearly more: of a threshold that spans the image, of points that are not spread over it. Of `n` matches the `k`
 //! nearest are within `r_k`; five of them any sample fits. So among `m` motions that were tried, the number of those that do as
 //! well by chance is at most
 //!
@@ -12,7 +13,7 @@
 //! (after L. Moisan, B. Stival, *A probabilistic criterion to detect rigid point matches between two images*, IJCV 2004, who take
 //! all `C(n, 5)` samples for `m`).
 
-use crate::robust::data::columns::Columns;
+use crate::robust::data::columns::{Columns, Residuals};
 use crate::robust::data::observations::Observations;
 use crate::robust::search::pose_score::ScoredPose;
 use crate::solver::shared::motion::Motion;
@@ -28,36 +29,66 @@ const SOLUTIONS: f64 = 4.0;
 
 /// The base ten logarithm of the number of false alarms of a pose that was found among so many samples.
 pub(crate) fn log_false_alarms(pose: &ScoredPose, iterations: usize, false_matches: &Columns) -> f64 {
-    let chance = chance_of_a_pixel(false_matches, &pose.scored.motion);
+    let chance = Chance::new(false_matches, &pose.scored.motion);
     let mut errors: Vec<f64> = pose.inlier_residuals().map(f64::abs).collect();
     errors.sort_unstable_by(f64::total_cmp);
-    least_log_false_alarms(pose.residuals().len(), &errors, chance, SOLUTIONS * iterations as f64)
+    least_log_false_alarms(pose.residuals().len(), &errors, &chance, SOLUTIONS * iterations as f64)
 }
 
 /// The same for the inliers' errors in ascending order.
-fn least_log_false_alarms(matches: usize, errors: &[f64], chance_of_a_pixel: f64, tried: f64) -> f64 {
+fn least_log_false_alarms(matches: usize, errors: &[f64], chance: &Chance, tried: f64) -> f64 {
     let free = matches - 5;
     let all_samples: f64 = (0..5).map(|i| ((matches - i) as f64 / (5 - i) as f64).log10()).sum();
     let fixed = (free as f64).log10() + tried.log10().min(all_samples + SOLUTIONS.log10());
     let (mut choose, mut least) = (0.0, f64::INFINITY);
     for (k, error) in (1..).zip(errors.iter().skip(5)) {
         choose += ((free + 1 - k) as f64 / k as f64).log10();
-        let alarms = fixed + choose + k as f64 * (error * chance_of_a_pixel).min(1.0).log10();
+        let alarms = fixed + choose + k as f64 * chance.within(*error).min(1.0).log10();
         least = alarms.min(least);
     }
     least
 }
 
+/// How often false matches agree with a motion.
+#[derive(Debug)]
+pub(crate) struct Chance {
+    /// The errors of those that come near, in ascending order.
+    errors: Vec<f64>,
+    /// How many were looked at.
+    count: f64,
+    /// `α(1)`.
+    of_a_pixel: f64,
+}
+
+impl Chance {
+    pub(crate) fn new(false_matches: &Columns, motion: &Motion) -> Self {
+        let wide = WIDE * false_matches.threshold();
+        let mut residuals = Residuals::default();
+        false_matches.residuals(&motion.essential(), motion, &mut residuals);
+        let near = |&i: &usize| residuals.values[i].abs() < wide && residuals.is_in_front(i, 0);
+        let near = (0..false_matches.len()).filter(near);
+        let mut errors: Vec<f64> = near.map(|i| residuals.values[i].abs()).collect();
+        errors.sort_unstable_by(f64::total_cmp);
+        let count = 1.0 + false_matches.len() as f64;
+        let of_a_pixel = (1.0 + errors.len() as f64) / count / wide;
+        Self { errors, count, of_a_pixel }
+    }
+
+    /// `α` of an error: the line, or what was measured less two of its standard deviations.
+    fn within(&self, error: f64) -> f64 {
+        let counted = self.share(error) * self.count;
+        (error * self.of_a_pixel).max((counted - 2.0 * counted.sqrt()) / self.count)
+    }
+
+    /// The share of false matches within an error.
+    pub(crate) fn share(&self, error: f64) -> f64 {
+        self.errors.partition_point(|e| *e < error) as f64 / self.count
+    }
+}
+
 /// Matches that are false.
 pub(crate) fn false_matches(observations: &Observations) -> Columns {
     observations.columns.shifted(FALSE_MATCHES)
-}
-
-/// The share of false matches that agree with a motion to one pixel.
-fn chance_of_a_pixel(false_matches: &Columns, motion: &Motion) -> f64 {
-    let wide = WIDE * false_matches.threshold();
-    let agreeing = 1.0 + false_matches.agreeing(motion, wide).len() as f64;
-    agreeing / (1.0 + false_matches.len() as f64) / wide
 }
 
 #[cfg(test)]
@@ -66,13 +97,17 @@ mod tests {
 
     #[test]
     fn false_alarms_are_counted() {
+        let chance = |of_a_pixel| Chance { errors: Vec::new(), count: 1.0, of_a_pixel };
         // 5 · 252 · 4 · C(5, 5) · 0.01^5 = 5.04e-7.
-        let all = least_log_false_alarms(10, &[1.0; 10], 0.01, 1e9);
+        let all = least_log_false_alarms(10, &[1.0; 10], &chance(0.01), 1e9);
         assert!((10_f64.powf(all) / 5.04e-7 - 1.0).abs() < 1e-9, "{all}");
         // Ten of a hundred are no sign of anything, thirty are, and ten that agree closely.
-        assert!(least_log_false_alarms(100, &[1.0; 10], 0.01, 1e5) > 0.0);
-        assert!(least_log_false_alarms(100, &[1.0; 30], 0.01, 1e5) < -10.0);
-        assert!(least_log_false_alarms(100, &[1e-4; 10], 0.01, 1e5) < -10.0);
-        assert!(least_log_false_alarms(100, &[1.0; 5], 0.01, 1e5).is_infinite());
+        assert!(least_log_false_alarms(100, &[1.0; 10], &chance(0.01), 1e5) > 0.0);
+        assert!(least_log_false_alarms(100, &[1.0; 30], &chance(0.01), 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1e-4; 10], &chance(0.01), 1e5) < -10.0);
+        assert!(least_log_false_alarms(100, &[1.0; 5], &chance(0.01), 1e5).is_infinite());
+        // False matches of which most agree exactly: thirty that do are no sign of anything, whatever the line says.
+        let exact = Chance { errors: vec![0.0; 400], count: 1_000.0, of_a_pixel: 0.01 };
+        assert!(least_log_false_alarms(100, &[1e-4; 30], &exact, 1e5) > 0.0);
     }
 }

@@ -132,11 +132,19 @@ impl Usual {
         norm / (self.scale(depth, sigma) * (1.0 + self.distance(depth, sigma).powi(3)))
     }
 
-    /// The mean and the standard deviation of an inverse depth, given what was measured of it and of the others.
-    pub(crate) fn given(&self, depth: &InverseDepth, sigma: f64) -> [f64; 2] {
-        let (spread, noise) = ((self.reach / DEVIATIONS).powi(2), depth.variance(sigma));
+    /// The mean and the standard deviation of an inverse depth, given what was measured of it and of the others; `spread` is the
+    /// variance of those.
+    pub(crate) fn given(&self, depth: &InverseDepth, sigma: f64, spread: f64) -> [f64; 2] {
+        let noise = depth.variance(sigma);
         let share = spread / (spread + noise);
         [self.median + share * (depth.value - self.median), (share * noise).sqrt()]
+    }
+
+    /// The variance of the inverse depths themselves, without that of their noise, whose median is `noise`. It is not less than
+    /// two standard deviations of what the noise of `count` depths may hide.
+    pub(crate) fn spread(&self, noise: f64, count: usize) -> f64 {
+        let hidden = 2.0 * noise * (2.0 / count as f64).sqrt();
+        ((self.reach / DEVIATIONS).powi(2) - noise).max(hidden)
     }
 }
 

@@ -4,26 +4,30 @@
 mod alternatives;
 mod chance_inliers;
 mod covariance;
+mod equal_depths;
+mod evidence;
 pub(crate) mod false_alarms;
 mod final_refinement;
 mod inverse_depth;
 mod length;
+mod mixture;
 mod model;
 mod plane;
 mod report;
+mod small_motion;
 
 use rand_chacha::ChaCha8Rng;
 
-use crate::robust::conclude::alternatives::{Alternative, alternatives, better_of};
+use crate::robust::conclude::alternatives::{alternatives, better_of};
 use crate::robust::conclude::chance_inliers::refine_without_chance;
+use crate::robust::conclude::false_alarms::Chance;
 use crate::robust::conclude::final_refinement::{Polished, polish};
-use crate::robust::conclude::model::{Verdict, choose};
-use crate::robust::conclude::plane::Plane;
+use crate::robust::conclude::model::choose;
 use crate::robust::conclude::report::{Conclusion, report};
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
 use crate::robust::estimate::{Estimate, Model};
-use crate::robust::options::EstimateError;
+use crate::robust::options::{EstimateError, UNUSUAL};
 use crate::robust::search::SearchResult;
 use crate::robust::search::pose_score::PoseScorer;
 use crate::robust::search::search_score::MANY;
@@ -39,10 +43,12 @@ pub(crate) enum Answer {
     Other,
 }
 
-/// Steps 3 to 6: the estimate that the result of the search leads to.
+/// Steps 3 to 6: the estimate that the result of the search leads to. `blind` are the matches of the search where they are others:
+/// those of which none was chosen because it agrees, by which chance is judged.
 pub(crate) fn conclude(
     poses: &mut PoseScorer,
     found: &SearchResult,
+    blind: Option<&Observations>,
     answer: Answer,
     max_false_alarms: f64,
     rng: &mut ChaCha8Rng,
@@ -54,54 +60,74 @@ pub(crate) fn conclude(
     let polished = better_of(poses, polished, &others);
     let polished = refine_without_chance(poses, polished);
     let false_matches = false_alarms::false_matches(observations);
-    refuse_chance(observations, &polished, found.iterations, &false_matches, max_false_alarms)?;
-    let verdict = choose(observations, &polished, plane.as_ref());
-    let others = of_exact_plane(poses, plane, &verdict, &polished).unwrap_or(others);
-    refuse_line(observations, &polished, verdict.model)?;
-    let conclusion = Conclusion { polished, others: &others, verdict, false_matches: &false_matches };
+    let false_share = Chance::new(&false_matches, polished.motion()).share(poses.threshold());
+    let log_alarms = log_false_alarms(poses, &polished, found.iterations, blind, &false_matches);
+    let inliers = polished.pose.inliers.len();
+    if inliers < MIN_MATCHES || log_alarms > max_false_alarms.log10() {
+        return Err(no_pose(observations, inliers, false_share));
+    }
+    let (polished, small) = small_motion::look(poses, polished);
+    let verdict = choose(observations, &polished, plane.as_ref(), small.as_ref());
+    let over_all = plane
+        .filter(|_| verdict.model == Model::Planar)
+        .and_then(|plane| plane.over_all(observations, &polished.pose.inliers, polished.sigma));
+    let others = match over_all {
+        Some(plane) if verdict.is_exact_plane => alternatives(poses, &plane, &polished),
+        _ => others,
+    };
+    let plane = over_all.or(plane);
+    refuse_line(observations, &polished, verdict.model, false_share)?;
+    let conclusion = Conclusion {
+        polished,
+        small,
+        plane,
+        others: &others,
+        verdict,
+        false_matches: &false_matches,
+        false_share,
+    };
     // A whole family of poses is no pose, and none is known where the rotation may be any.
     report(poses, found, conclusion, answer)
         .ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))
 }
 
-/// Refuses a pose that agrees with no more matches than chance explains. With few matches chance cannot be told from truth: the best
-/// pose is returned where a sample's worth of them agree with it.
-fn refuse_chance(
-    observations: &Observations,
+/// The base ten logarithm of the number of false alarms. With few matches chance cannot be told from truth: the best pose is taken
+/// where a sample's worth of them agree with it.
+fn log_false_alarms(
+    poses: &PoseScorer,
     polished: &Polished,
     iterations: usize,
+    blind: Option<&Observations>,
     false_matches: &Columns,
-    max_false_alarms: f64,
-) -> Result<(), EstimateError> {
-    let inliers = polished.pose.inliers.len();
-    let is_chance = observations.len() >= MANY
-        && false_alarms::log_false_alarms(&polished.pose, iterations, false_matches)
-            > max_false_alarms.log10();
-    if inliers < MIN_MATCHES || is_chance {
-        return Err(no_pose(observations, inliers));
+) -> f64 {
+    let Some(blind) = blind else {
+        if poses.observations.len() < MANY {
+            return f64::NEG_INFINITY;
+        }
+        return false_alarms::log_false_alarms(&polished.pose, iterations, false_matches);
+    };
+    if blind.len() < MANY {
+        return f64::NEG_INFINITY;
     }
-    Ok(())
+    let pose = poses.of(blind).score(*polished.motion(), poses.threshold());
+    false_alarms::log_false_alarms(&pose, iterations, &false_alarms::false_matches(blind))
 }
 
-/// Where the plane is exact, its motions once it is refined over more of the inliers.
-fn of_exact_plane(
-    poses: &mut PoseScorer,
-    plane: Option<Plane>,
-    verdict: &Verdict,
+/// Refuses inliers on a line, which determine a rotation and no translation. Within a threshold as wide as the image all are.
+fn refuse_line(
+    observations: &Observations,
     polished: &Polished,
-) -> Option<Vec<Alternative>> {
-    let plane = plane.filter(|_| verdict.model == Model::Planar && verdict.is_exact_plane)?;
-    let plane = plane.over_all(poses.observations, &polished.pose.inliers, polished.sigma)?;
-    Some(alternatives(poses, &plane, polished))
-}
-
-/// Refuses inliers on a line, which determine a rotation and no translation.
-fn refuse_line(observations: &Observations, polished: &Polished, model: Model) -> Result<(), EstimateError> {
+    model: Model,
+    false_share: f64,
+) -> Result<(), EstimateError> {
     let inliers = &polished.pose.inliers;
     let some = &inliers[..inliers.len().min(DIAGNOSED)];
     let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
-    if model != Model::PureRotation && observations.is_line(&some) {
-        return Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()));
+    if model == Model::PureRotation || !observations.is_line(&some) {
+        return Ok(());
     }
-    Ok(())
+    if false_share >= UNUSUAL {
+        return Err(no_pose(observations, inliers.len(), false_share));
+    }
+    Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()))
 }

@@ -10,28 +10,46 @@
 //! with `d_M` the whitened transfer error of the model (two numbers a match) and `r_E` the Sampson error (one number). Where
 //! the model holds, `F` is one: the second number is noise as the first (the idea of K. Kanatani's geometric information
 //! criterion, with a cap against false matches). Where it does not, `F` goes to the cap.
+//!
+//! A rotation takes up the mean of the displacements, so that `F` stays low as long as their spread is not well above the noise,
+//! however many matches there are. Where `F` is low the likelihood of all matches decides (see
+//! [`small_motion`](crate::robust::conclude::small_motion)); with few matches `F` alone.
 
 use nalgebra::UnitQuaternion;
 
 use crate::alignment::best_rotation;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::plane::Plane;
+use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::Framed;
 use crate::robust::estimate::{Evidence, Model};
 use crate::robust::refine::loss::SCALE;
 use crate::robust::refine::loss::{CAP, GemanMcClure};
 use crate::robust::refine::point_transfer::refine_rotation;
+use crate::robust::search::search_score::MANY;
 
-/// A rotation alone is enough below this.
+/// With few matches a rotation alone is enough below this.
 const ROTATION: f64 = 3.0;
+
+/// A rotation alone is enough while the evidence against it is below this, in nats: of 600 rotations in place none came to 9, and
+/// that one with 30 matches.
+const EVIDENT: f64 = 12.0;
+
+/// A rotation that leaves more than this is not enough whatever the evidence.
+pub(crate) const NOT_A_ROTATION: f64 = 5.0;
+
+/// A plane has to explain all but this share of what a rotation leaves: where that is little, any plane leaves little.
+const UNEXPLAINED: f64 = 0.1;
 
 /// A plane is enough below this, and a little above it where there are few matches.
 const PLANE: f64 = 1.7;
 const PLANE_OF_FEW: f64 = 20.0;
 
-/// A plane is exact below this, at the noise that the matches show: one, and its scatter for a hundred matches.
+/// A plane is exact below this, at the noise that the matches show: one, and its scatter for a hundred matches. It is not more
+/// than so many standard deviations of that scatter above one, whatever the number of matches.
 const EXACT_PLANE: f64 = 1.3;
+const EXACT_DEVIATIONS: f64 = 2.5;
 
 /// The noise that models are compared at is not taken to be below this share of the threshold: of noise so small
 /// every real camera's calibration error stands clear.
@@ -60,32 +78,48 @@ pub(crate) struct Verdict {
     pub(crate) is_exact_plane: bool,
 }
 
-/// Compares the models over the inliers of a pose.
-pub(crate) fn choose(observations: &Observations, polished: &Polished, plane: Option<&Plane>) -> Verdict {
+/// Compares the models over the inliers of a pose; `small` where a rotation alone leaves little.
+pub(crate) fn choose(
+    observations: &Observations,
+    polished: &Polished,
+    plane: Option<&Plane>,
+    small: Option<&SmallMotion>,
+) -> Verdict {
     let pose = &polished.pose;
     let inliers = &pose.inliers[..pose.inliers.len().min(ENOUGH)];
     let noise = polished.sigma;
     let sigma = noise.max(LEAST_NOISE * observations.columns.threshold());
     let framed = observations.framed(inliers);
-    let q_21 = rotation_alone(observations, inliers, &framed, &polished.motion().q_21, sigma);
-    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let q_21 = small.map_or_else(
+        || rotation_alone(observations, inliers, &framed, &polished.motion().q_21, sigma),
+        |small| small.q_21,
+    );
     let general: Vec<f64> = inliers.iter().map(|&i| pose.residuals()[i as usize].powi(2)).collect();
-    let rotation = framed.square_errors(&r_21);
+    let rotation = framed.square_errors(&q_21.to_rotation_matrix().into_inner());
     let planar = plane.map(|plane| framed.square_errors(&plane.homography));
-    let excess = |model: &[f64], sigma: f64| {
-        let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
-        (capped(model) - capped(&general)) / inliers.len().max(1) as f64
-    };
     let few = (PLANE_OF_FEW / inliers.len().max(1) as f64).min(1.0);
-    let of_plane = |sigma| planar.as_ref().map_or(CAP, |planar| excess(planar, sigma));
-    let is_exact_plane = of_plane(noise) < EXACT_PLANE;
-    let model = if excess(&rotation, sigma) < ROTATION {
-        Model::PureRotation
-    } else if of_plane(sigma) < PLANE + few {
-        Model::Planar
-    } else {
-        Model::General
+    let of_plane = |sigma| planar.as_ref().map_or(CAP, |planar| excess(planar, &general, sigma));
+    let is_plane = |sigma| of_plane(sigma) < PLANE + few;
+    let is_rotation = match small {
+        Some(small) => small.nats < EVIDENT && small.excess < NOT_A_ROTATION,
+        None => observations.len() < MANY && excess(&rotation, &general, sigma) < ROTATION,
     };
+    let is_plane = match small {
+        Some(SmallMotion { excess, sigma, .. }) => {
+            let explains = || of_plane(*sigma) - 1.0 < UNEXPLAINED * (excess - 1.0);
+            is_plane(*sigma) && (*excess > NOT_A_ROTATION || explains())
+        }
+        None => is_plane(sigma),
+    };
+    let model = match (is_rotation, is_plane) {
+        (true, _) => Model::PureRotation,
+        (false, true) => Model::Planar,
+        (false, false) => Model::General,
+    };
+    let scatter = (2.0 / inliers.len().max(1) as f64).sqrt();
+    // Of a small motion any plane explains much.
+    let is_exact_plane =
+        small.is_none() && of_plane(noise) < EXACT_PLANE.min(1.0 + EXACT_DEVIATIONS * scatter);
     let evidence = Evidence {
         rotation_px: median_root(rotation),
         planar_px: planar.map_or(f64::INFINITY, median_root),
@@ -94,9 +128,15 @@ pub(crate) fn choose(observations: &Observations, polished: &Polished, plane: Op
     Verdict { model, evidence, q_21, is_exact_plane }
 }
 
+/// `F` of a model at this noise.
+pub(crate) fn excess(model: &[f64], general: &[f64], sigma: f64) -> f64 {
+    let capped = |squares: &[f64]| squares.iter().map(|s| (s / (sigma * sigma)).min(CAP)).sum::<f64>();
+    (capped(model) - capped(general)) / general.len().max(1) as f64
+}
+
 /// The rotation that best takes the points to their matches, from two starts: that of the pose and that which aligns the
 /// bearings.
-fn rotation_alone(
+pub(crate) fn rotation_alone(
     observations: &Observations,
     inliers: &[u32],
     framed: &Framed,

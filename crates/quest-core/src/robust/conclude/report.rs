@@ -9,7 +9,10 @@ use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plan
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
+use crate::robust::conclude::mixture::mixture;
 use crate::robust::conclude::model::Verdict;
+use crate::robust::conclude::plane::Plane;
+use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
 use crate::robust::estimate::{Estimate, Model, RunnerUp};
@@ -25,9 +28,14 @@ const NEAR_POINT: f64 = 3.0;
 /// What is known of the matches when the answers are chosen.
 pub(crate) struct Conclusion<'a> {
     pub(crate) polished: Polished,
+    /// Where a rotation alone leaves little.
+    pub(crate) small: Option<SmallMotion>,
+    pub(crate) plane: Option<Plane>,
     pub(crate) others: &'a [Alternative],
     pub(crate) verdict: Verdict,
     pub(crate) false_matches: &'a Columns,
+    /// The share of false matches that the threshold accepts.
+    pub(crate) false_share: f64,
 }
 
 /// The estimate; `None` where the answer is left with too few inliers or without a covariance.
@@ -42,10 +50,15 @@ pub(crate) fn report(
     if let (Answer::Other, Some(second)) = (answer, &mut second) {
         std::mem::swap(&mut motion, second);
     }
-    let Conclusion { mut polished, verdict, false_matches, .. } = conclusion;
+    let Conclusion { mut polished, small, plane, verdict, false_matches, false_share, .. } = conclusion;
     let (model, sigma) = (verdict.model, polished.sigma);
     polished.pose = poses.score(motion, poses.threshold());
-    if model == Model::PureRotation {
+    // The motions of an exact plane have a covariance of their own.
+    let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
+    let small = small.filter(|_| !is_of_plane && answer == Answer::Best);
+    if let Some(small) = &small {
+        polished.pose.inliers.retain(|&i| small.is_likely[i as usize]);
+    } else if model == Model::PureRotation {
         let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
         let limit = (NEAR_POINT * poses.threshold()).powi(2);
         let mut squares = observations.framed(&polished.pose.inliers).square_errors(&r_21).into_iter();
@@ -58,17 +71,24 @@ pub(crate) fn report(
     }
     let noise = Noise { sigma, false_matches };
     let size = length(observations, &motion, inliers, &noise);
-    let covariance = match model {
-        Model::PureRotation => covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size),
-        _ => covariance::of_pose(observations, &polished, size, false_matches),
-    }?;
-    let mut mask = vec![false; observations.len()];
+    let pose = with_length(&motion, size);
+    let (pose, covariance) = if let Some(small) = &small {
+        let general = covariance::of_pose(observations, &polished, size, false_matches);
+        let general = general.map(|covariance| (pose, covariance));
+        mixture(observations, small, sigma, general.as_ref())
+            .filter(|(_, covariance)| covariance::says_something(covariance))?
+    } else if model == Model::PureRotation {
+        (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
+    } else {
+        (pose, covariance::of_pose(observations, &polished, size, false_matches)?)
+    };
+    let mut mask = vec![false; observations.given];
     for &i in inliers {
         mask[observations.order[i as usize]] = true;
     }
     Some(Estimate {
         model,
-        pose: with_length(&motion, size),
+        pose,
         covariance,
         inlier_count: inliers.len(),
         inliers: mask,
@@ -77,6 +97,9 @@ pub(crate) fn report(
         runner_up: second.map(|motion| runner_up(poses, motion, &noise)),
         evidence: verdict.evidence,
         noise_px: sigma,
+        normal: plane.filter(|_| model == Model::Planar).and_then(|plane| normal(&plane, &pose)),
+        false_share,
+        unmoved: 0,
     })
 }
 
@@ -91,6 +114,7 @@ fn answers(
     let is_few = observations.len() < MANY;
     let (motion, mut second) = match verdict.model {
         Model::Planar => both_of_plane(poses, others, polished.motion(), verdict.is_exact_plane),
+        Model::PureRotation if conclusion.small.is_some() => (*polished.motion(), None),
         Model::PureRotation => (still(observations, &polished.pose.inliers, verdict.q_21), None),
         Model::General if is_few => (*polished.motion(), None),
         Model::General => (*polished.motion(), as_likely(poses, others, polished)),
@@ -105,6 +129,19 @@ fn answers(
 fn still(observations: &Observations, inliers: &[u32], q_21: UnitQuaternion<f64>) -> Motion {
     let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
     Motion { q_21, direction: translation_direction(&q_21, &matches) }
+}
+
+/// The `n` for which `R + t nᵀ` is nearest to the homography of a plane: `H = s (R + t nᵀ)` has the scale that makes its middle
+/// singular value one, and the sign that keeps points in front.
+fn normal(plane: &Plane, pose: &RelativePose) -> Option<[f64; 3]> {
+    let h = plane.homography;
+    let mut values: [f64; 3] = h.singular_values().into();
+    values.sort_unstable_by(f64::total_cmp);
+    let scale = h.determinant().signum() / values[1];
+    let square = pose.t_21.norm_squared();
+    let rest = h * scale - pose.r_21();
+    let normal: [f64; 3] = (rest.tr_mul(&pose.t_21) / square).into();
+    normal.iter().all(|x| x.is_finite()).then_some(normal)
 }
 
 fn with_length(motion: &Motion, size: Length) -> RelativePose {

@@ -17,6 +17,9 @@ const WIDTH: usize = 8;
 /// Rays closer than this multiple of the threshold, in pixels of both views, have no depth.
 const DISPARITY: f64 = 2.0;
 
+/// A threshold as wide as the image does not make all of it an epipole: the square of a tenth of a radian.
+const LARGEST_EPIPOLE: f64 = 0.01;
+
 /// The poses of an essential matrix: of a motion, with the opposite translation, and the same of its twisted partner.
 pub(crate) const POSES: usize = 4;
 
@@ -112,6 +115,11 @@ impl Columns {
         k1 + k2
     }
 
+    /// The geometric mean of the focal lengths, in pixels.
+    pub(crate) fn focal_length(&self) -> f64 {
+        self.images.iter().map(|image| image.square_focal_length().sqrt()).product::<f64>().sqrt()
+    }
+
     /// The squared angle, in radians, that a pixel in both views stands for.
     pub(crate) fn square_angle_of_pixel(&self) -> f64 {
         self.images.iter().map(|image| 1.0 / image.square_focal_length()).sum()
@@ -191,6 +199,8 @@ struct View {
     curvature: f64,
     /// The squared sine below which rays have no depth.
     parallel: f64,
+    /// The squared sine of a ray and the translation below which it is at the epipole.
+    at_epipole: f64,
 }
 
 impl View {
@@ -211,6 +221,8 @@ impl View {
             squares: [d1, d2].map(|d| d.map(|d| d * d)),
             curvature: columns.curvature(),
             parallel: (DISPARITY * columns.threshold).powi(2) * columns.square_angle_of_pixel(),
+            at_epipole: (0.5 * columns.threshold.powi(2) * columns.square_angle_of_pixel())
+                .min(LARGEST_EPIPOLE),
         }
     }
 
@@ -241,6 +253,7 @@ impl View {
     /// With `b = D2 x2` and `c = R D1 x1`, `−(b × t) · (b × c)` and `−(c × t) · (b × c)` have the signs of the depths. In the
     /// twisted partner `c` is turned about `t` by 180°.
     #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn few<const SPHERE: bool>(
         &self,
         [x1, y1, z1, x2, y2, z2]: [&[f64; WIDTH]; 6],
@@ -272,7 +285,11 @@ impl View {
             let tc = t1[0] * x1 + t1[1] * y1 + t1[2] * z1;
             let bb = d2[0] * x2 * x2 + d2[1] * y2 * y2 + d2[2] * z2 * z2;
             let cc = d1[0] * x1 * x1 + d1[1] * y1 * y1 + d1[2] * z1 * z1;
-            sides[j] = self.sides(bc, tb, tc, bb, cc) | self.sides(2.0 * tb * tc - bc, tb, tc, bb, cc) << 2;
+            let both = self.sides(bc, tb, tc, bb, cc) | self.sides(2.0 * tb * tc - bc, tb, tc, bb, cc) << 2;
+            // Within the threshold of an epipole any partner agrees: such a match supports no pose.
+            let says_something =
+                (bb - tb * tb > self.at_epipole * bb) & (cc - tc * tc > self.at_epipole * cc);
+            sides[j] = if says_something { both } else { 0 };
         }
     }
 

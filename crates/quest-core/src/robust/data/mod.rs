@@ -2,5 +2,6 @@
 
 pub(crate) mod columns;
 pub(crate) mod image;
+pub(crate) mod keypoints;
 pub(crate) mod observations;
 pub(crate) mod point_transfer;

@@ -28,12 +28,14 @@ pub(crate) struct Observations {
     pub(crate) matches: Vec<Correspondence>,
     /// Where each of them stands in the caller's order.
     pub(crate) order: Vec<usize>,
+    /// How many matches the caller has.
+    pub(crate) given: usize,
     /// The same matches in columns.
     pub(crate) columns: Columns,
 }
 
 impl Observations {
-    /// The matches in this order, with the focal lengths of both views and the inlier threshold in pixels.
+    /// Some of the matches in this order, with the focal lengths of both views and the inlier threshold in pixels.
     pub(crate) fn new(
         given: &[Correspondence],
         order: Vec<usize>,
@@ -49,7 +51,7 @@ impl Observations {
             .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
         let points = matches.iter().map(|m| [*m.bearing1(), *m.bearing2()]);
         let columns = Columns::of_points(images, threshold, points);
-        Self { matches, order, columns }
+        Self { matches, order, given: given.len(), columns }
     }
 
     pub(crate) fn len(&self) -> usize {

@@ -63,6 +63,40 @@ impl Framed {
     }
 }
 
+/// How far one match is from where a rotation takes it, whitened, and how that changes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Displacement {
+    /// Two numbers of unit noise for noise of one pixel.
+    pub(crate) residual: [f64; 2],
+    /// Their derivatives by `y`.
+    pub(crate) slope: [Vector3<f64>; 2],
+    /// The point of view 1 after the rotation.
+    pub(crate) y: Vector3<f64>,
+    /// The point of view 1.
+    pub(crate) x1: Vector3<f64>,
+    pub(crate) is_in_front: bool,
+}
+
+impl Framed {
+    /// The displacements of all matches from where a rotation takes them.
+    pub(crate) fn displacements(&self, r_21: &Matrix3<f64>) -> Vec<Displacement> {
+        let r_21 = rows(r_21);
+        let of_block = |block: &Block| {
+            let w = whitened(&r_21, block);
+            let vector = |v: &[Lanes; 3], j: usize| Vector3::new(v[0][j], v[1][j], v[2][j]);
+            let x1 = block.x1;
+            (0..WIDTH).map(move |j| Displacement {
+                residual: [w.residual[0][j], w.residual[1][j]],
+                slope: [vector(&w.slope[0], j), vector(&w.slope[1], j)],
+                y: vector(&w.y, j),
+                x1: vector(&x1, j),
+                is_in_front: w.is_in_front[j],
+            })
+        };
+        self.blocks.iter().flat_map(of_block).take(self.len).collect()
+    }
+}
+
 impl Block {
     /// Of at most [`WIDTH`] matches, and at least one.
     fn new(some: &[FramedMatch]) -> Self {

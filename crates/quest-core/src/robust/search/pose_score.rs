@@ -74,6 +74,11 @@ impl<'a> PoseScorer<'a> {
         Self { observations, loss, spare: Vec::new() }
     }
 
+    /// The same for other matches.
+    pub(crate) fn of<'b>(&self, observations: &'b Observations) -> PoseScorer<'b> {
+        PoseScorer::new(observations, self.loss)
+    }
+
     /// Takes the memory of a pose that is not needed any more.
     pub(crate) fn recycle(&mut self, pose: ScoredPose) {
         self.spare.push((pose.residuals, pose.inliers));

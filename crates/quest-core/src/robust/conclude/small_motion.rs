@@ -1,0 +1,266 @@
+//! A camera that hardly moves: which of the local minima is right, which matches agree by chance, and whether there is a
+//! translation.
+//!
+//! All of this is asked only where a rotation alone leaves little of the displacements, and of more than a few matches.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::robust::conclude::evidence::{Likelihood, ROUNDS};
+use crate::robust::conclude::final_refinement::{FEWEST, Polished};
+use crate::robust::conclude::model::{NOT_A_ROTATION, excess, rotation_alone};
+use crate::robust::data::observations::Observations;
+use crate::robust::refine::epipolar::{FINE, Subset, refine};
+use crate::robust::search::pose_score::PoseScorer;
+use crate::robust::search::search_score::MANY;
+use crate::solver::shared::motion::Motion;
+
+/// The motion is small where a rotation leaves less than this (the `F` of [`model`](crate::robust::conclude::model)).
+const SMALL: f64 = 7.0;
+
+/// The calibration error of a good camera, in radians: noise below that tells nothing of the model.
+const CALIBRATION: f64 = 1e-4;
+
+/// Inliers that are looked at to see whether the motion is small, and if it is.
+const GLANCE: usize = 300;
+const ENOUGH: usize = 2_000;
+
+/// Matches whose likelihood decides, and those that minima are compared and refined over.
+const WEIGHED: usize = 3_000;
+const COMPARED: usize = 1_000;
+
+/// Directions of the translation to begin with, steps of the refinement, and rounds of EM when minima are compared.
+const DIRECTIONS: usize = 12;
+const STEPS: usize = 10;
+const FEW_ROUNDS: usize = 4;
+
+/// Fewer inliers than this have too few to compare minima over.
+const LEAST_INLIERS: usize = 16;
+
+/// Another minimum has to be better by so many nats.
+const BETTER: f64 = 2.0;
+
+/// A match whose displacement is more than this many standard deviations is not explained by the rotation.
+const OFF: f64 = 5.0;
+
+/// Matches that a rotation does not explain, of which at most so many are looked at, and pairs of them.
+const OFF_COUNT: usize = 300;
+const PAIRS: usize = 600;
+
+/// A match is within this many standard deviations of its epipolar line.
+const WITHIN: f64 = 3.0;
+
+/// Matches less likely true than this are there by chance.
+const LIKELY: f64 = 0.5;
+
+/// At most one in so many inliers is there by chance; more is a sign that the likelihood is wrong.
+const MOST_BY_CHANCE: usize = 5;
+
+/// What is known of a motion that is small.
+#[derive(Debug)]
+pub(crate) struct SmallMotion {
+    /// The best rotation without translation.
+    pub(crate) q_21: UnitQuaternion<f64>,
+    /// What it leaves: the `F` of [`model`](crate::robust::conclude::model).
+    pub(crate) excess: f64,
+    /// The evidence against it, in nats.
+    pub(crate) nats: f64,
+    /// The noise with that of the calibration, in pixels.
+    pub(crate) sigma: f64,
+    /// Matches that may be true.
+    pub(crate) is_likely: Vec<bool>,
+    pub(crate) likelihood: Likelihood,
+}
+
+/// Looks at a pose whose motion is small: the pose of the likeliest minimum, refined without matches that agree by chance.
+pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Option<SmallMotion>) {
+    let observations = poses.observations;
+    let sigma = polished.sigma.hypot(CALIBRATION * observations.columns.focal_length());
+    let inliers = polished.pose.inliers.len();
+    if observations.len() < MANY || inliers == 0 {
+        return (polished, None);
+    }
+    let start = polished.motion().q_21;
+    let (q_21, excess) = best_rotation(observations, &polished, &start, sigma, GLANCE);
+    if excess >= SMALL {
+        return (polished, None);
+    }
+    let (q_21, excess) = if inliers > GLANCE {
+        best_rotation(observations, &polished, &q_21, sigma, ENOUGH)
+    } else {
+        (q_21, excess)
+    };
+    let share = inliers as f64 / observations.len() as f64;
+    let likelihood = |count: usize| {
+        let all: Vec<u32> = (0_u32..).take(observations.len().min(count)).collect();
+        Likelihood::new(observations, &all, &q_21, sigma, share)
+    };
+    let mut polished = polished;
+    if excess < NOT_A_ROTATION && inliers >= LEAST_INLIERS {
+        polished = likeliest(poses, polished, &q_21, sigma, &likelihood(COMPARED));
+    }
+    let (polished, is_likely) = without_chance(poses, polished, &likelihood(usize::MAX));
+    let likelihood = likelihood(WEIGHED);
+    let nats = likelihood.of(polished.motion(), ROUNDS).nats;
+    (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, likelihood }))
+}
+
+/// The best rotation for some of the inliers, and what it leaves.
+fn best_rotation(
+    observations: &Observations,
+    polished: &Polished,
+    start: &UnitQuaternion<f64>,
+    sigma: f64,
+    count: usize,
+) -> (UnitQuaternion<f64>, f64) {
+    let inliers = &polished.pose.inliers[..polished.pose.inliers.len().min(count)];
+    let framed = observations.framed(inliers);
+    let q_21 = rotation_alone(observations, inliers, &framed, start, sigma);
+    let general: Vec<f64> = inliers.iter().map(|&i| polished.pose.residuals()[i as usize].powi(2)).collect();
+    let rotation = framed.square_errors(&q_21.to_rotation_matrix().into_inner());
+    (q_21, excess(&rotation, &general, sigma))
+}
+
+/// The local minimum of the greatest evidence: where the parallax is no more than the noise, which of the minima of the Sampson
+/// errors is the lowest is chance.
+fn likeliest(
+    poses: &mut PoseScorer,
+    polished: Polished,
+    q_21: &UnitQuaternion<f64>,
+    sigma: f64,
+    likelihood: &Likelihood,
+) -> Polished {
+    let observations = poses.observations;
+    let of_both_signs = |motion: Motion| {
+        let signs = [1.0, -1.0].map(|sign| Motion { direction: motion.direction * sign, ..motion });
+        let [plus, minus] = signs.map(|motion| likelihood.of(&motion, FEW_ROUNDS).nats);
+        if plus >= minus { (plus, signs[0]) } else { (minus, signs[1]) }
+    };
+    let refined = |poses: &mut PoseScorer, mut motion: Motion, some: &[u32]| {
+        let count = some.len().min(COMPARED);
+        let subset = Subset::new(&poses.observations.columns, &some[..count]);
+        refine(&subset, &mut motion, &polished.loss, FINE, STEPS);
+        motion
+    };
+    let wide = poses.score(*polished.motion(), polished.limit);
+    let current = likelihood.of(polished.motion(), FEW_ROUNDS).nats;
+    let mut best = (current, *polished.motion());
+    let mut consider = |(nats, motion): (f64, Motion)| {
+        if nats > best.0 {
+            best = (nats, motion);
+        }
+    };
+    for k in 0..DIRECTIONS {
+        let start = Motion { q_21: *q_21, direction: on_half_sphere(k) };
+        consider(of_both_signs(refined(poses, start, &wide.inliers)));
+    }
+    poses.recycle(wide);
+    if let Some(direction) = direction_of_pairs(observations, q_21, sigma) {
+        for sign in [1.0, -1.0] {
+            let start = Motion { q_21: *q_21, direction: direction * sign };
+            let near = poses.score(start, polished.limit);
+            consider(of_both_signs(refined(poses, start, &near.inliers)));
+            poses.recycle(near);
+        }
+    }
+    let (nats, motion) = best;
+    if nats < current + BETTER {
+        return polished;
+    }
+    let wide = poses.score(motion, polished.limit);
+    let motion = if wide.inliers.len() >= FEWEST { refined(poses, motion, &wide.inliers) } else { motion };
+    poses.recycle(wide);
+    let pose = poses.score(motion, poses.threshold());
+    if pose.inliers.len() * 10 < polished.pose.inliers.len() * 9 {
+        return polished;
+    }
+    polished.with_pose(pose, poses.threshold())
+}
+
+/// The directions of half a sphere, evenly: on a spiral with the golden angle.
+fn on_half_sphere(k: usize) -> Vector3<f64> {
+    let z = 1.0 - (k as f64 + 0.5) / DIRECTIONS as f64;
+    let angle = k as f64 * std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    Vector3::new(radius * angle.cos(), radius * angle.sin(), z)
+}
+
+/// The direction that most of the matches agree with which a rotation does not explain, among those that pairs of them
+/// determine: a few near points before many distant ones, of which the rotation is known already.
+fn direction_of_pairs(
+    observations: &Observations,
+    q_21: &UnitQuaternion<f64>,
+    sigma: f64,
+) -> Option<Vector3<f64>> {
+    let all: Vec<u32> = (0_u32..).take(observations.len().min(WEIGHED)).collect();
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let off: Vec<_> = observations
+        .framed(&all)
+        .displacements(&r_21)
+        .into_iter()
+        .filter(|d| d.is_in_front && d.residual[0].hypot(d.residual[1]) > OFF * sigma)
+        .take(OFF_COUNT)
+        .collect();
+    // A translation `t` moves a point by `slope · t`: across the displacement it does not move it.
+    let across: Vec<Vector3<f64>> =
+        off.iter().map(|d| d.slope[0] * d.residual[1] - d.slope[1] * d.residual[0]).collect();
+    let (mut most, mut best) = (2, None);
+    let count = off.len();
+    let pairs = (1..count).flat_map(|gap| (0..count - gap).map(move |i| (i, i + gap))).take(PAIRS);
+    for (i, j) in pairs {
+        let Some(direction) = across[i].cross(&across[j]).try_normalize(1e-12) else { continue };
+        let sides = off.iter().map(|d| {
+            let b = [d.slope[0].dot(&direction), d.slope[1].dot(&direction)];
+            let length = b[0].hypot(b[1]).max(1e-12);
+            let is_near = (d.residual[0] * b[1] - d.residual[1] * b[0]).abs() < WITHIN * sigma * length;
+            let along = -(d.residual[0] * b[0] + d.residual[1] * b[1]);
+            if is_near { along.signum() } else { 0.0 }
+        });
+        let (mut plus, mut minus) = (0, 0);
+        for side in sides {
+            plus += usize::from(side > 0.0);
+            minus += usize::from(side < 0.0);
+        }
+        if plus.max(minus) > most {
+            most = plus.max(minus);
+            best = Some(if plus >= minus { direction } else { -direction });
+        }
+    }
+    best
+}
+
+/// Refines a pose over the matches that are more likely true than false, which then are its inliers: where the parallax is
+/// small, a match that agrees by chance is a point before the lens, with a lever a hundred times that of the others, which no loss
+/// of its residual makes up for.
+fn without_chance(
+    poses: &mut PoseScorer,
+    polished: Polished,
+    likelihood: &Likelihood,
+) -> (Polished, Vec<bool>) {
+    let columns = &poses.observations.columns;
+    let before = polished.pose.inliers.len();
+    let fewest = FEWEST.max(before - before / MOST_BY_CHANCE);
+    let likely = |motion: &Motion| -> Vec<bool> {
+        likelihood.of(motion, ROUNDS).is_true.into_iter().map(|p| p > LIKELY).collect()
+    };
+    let mut motion = *polished.motion();
+    let mut is_likely = likely(&motion);
+    for _ in 0..2 {
+        let wide = poses.score(motion, polished.limit);
+        let kept: Vec<u32> = wide.inliers.iter().copied().filter(|&i| is_likely[i as usize]).collect();
+        let is_all = kept.len() == wide.inliers.len();
+        poses.recycle(wide);
+        if kept.len() < fewest || is_all {
+            break;
+        }
+        refine(&Subset::new(columns, &kept), &mut motion, &polished.loss, FINE, STEPS);
+        is_likely = likely(&motion);
+    }
+    let mut pose = poses.score(motion, poses.threshold());
+    pose.inliers.retain(|&i| is_likely[i as usize]);
+    if pose.inliers.len() < fewest {
+        poses.recycle(pose);
+        let all = vec![true; poses.observations.len()];
+        return (polished, all);
+    }
+    (Polished { pose, ..polished }, is_likely)
+}

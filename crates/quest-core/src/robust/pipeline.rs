@@ -1,0 +1,128 @@
+//! The matches that an estimate is made from, and what it says of the others: one match a keypoint, and a group that did not move
+//! set aside.
+
+use nalgebra::Vector3;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Estimate, EstimateError, MIN_MATCHES, Options, Priors, RunnerUp, no_pose, search};
+use crate::robust::conclude::{self, Answer};
+use crate::robust::data::columns::Residuals;
+use crate::robust::data::keypoints::Keypoints;
+use crate::robust::data::observations::Observations;
+use crate::robust::search::pose_score::PoseScorer;
+use crate::robust::search::sampling;
+use crate::robust::search::search_score::REACH;
+use crate::solver::shared::motion::Motion;
+use crate::{Correspondence, InputError, RelativePose};
+
+/// Fewer matches than this that did not move are no group.
+const LEAST_UNMOVED: usize = 8;
+
+/// A bearing has not moved where it is the same to this: rounding.
+const UNMOVED: f64 = 1e-12;
+
+/// What an estimate is made of.
+pub(crate) struct Task<'a> {
+    pub(crate) matches: &'a [Correspondence],
+    pub(crate) options: &'a Options,
+    pub(crate) priors: &'a Priors<'a>,
+    pub(crate) answer: Answer,
+    pub(crate) is_cancelled: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Task<'_> {
+    /// The estimate. Matches that did not move at all while the others did, as dirt on the lens, an overlay or hot pixels
+    /// make them, fit a camera at rest without any error, and would win although they are fewer: the others are asked
+    /// first, and are right where they agree with a pose at least as often.
+    pub(crate) fn run(&self) -> Result<Estimate, EstimateError> {
+        let mut rng = sampling::generator(self.options.seed, self.options.index);
+        let mut order: Vec<usize> = (0..self.matches.len()).collect();
+        order.shuffle(&mut rng);
+        let keypoints = Keypoints::new(self.matches);
+        let needed = self.options.solver.info().min_matches.max(MIN_MATCHES);
+        let is_unmoved: Vec<bool> =
+            self.matches.iter().map(|m| (m.bearing1() - m.bearing2()).norm() < UNMOVED).collect();
+        let moved: Vec<usize> = order.iter().copied().filter(|&i| !is_unmoved[i]).collect();
+        let unmoved = order.len() - moved.len();
+        let mut second = None;
+        if unmoved >= LEAST_UNMOVED && moved.len() >= needed {
+            let found = self.of(&moved, &keypoints, rng.clone());
+            let found = found.ok().filter(|found| !self.explains_most(&found.pose, &is_unmoved));
+            match found {
+                Some(found) if found.inlier_count >= unmoved => return Ok(Estimate { unmoved, ..found }),
+                found => second = found,
+            }
+        }
+        let mut found = self.of(&order, &keypoints, rng)?;
+        if let Some(Estimate { pose, score, inlier_count, .. }) = second {
+            found.runner_up = Some(RunnerUp { pose, score, inlier_count });
+        }
+        Ok(found)
+    }
+
+    /// The estimate from some of the matches, in random order.
+    fn of(
+        &self,
+        order: &[usize],
+        keypoints: &Keypoints,
+        mut rng: ChaCha8Rng,
+    ) -> Result<Estimate, EstimateError> {
+        let Self { matches, options, priors, answer, is_cancelled } = *self;
+        let of = |order| Observations::new(matches, order, options.focal_lengths, options.threshold);
+        let needed = options.solver.info().min_matches.max(MIN_MATCHES);
+        if order.len() < needed {
+            return Err(InputError::TooFewMatches { found: order.len(), needed }.into());
+        }
+        let score = |i: usize| priors.scores.map_or(0.0, |scores| -scores[i]);
+        // Where each keypoint once leaves too little all are kept, and what is wrong with them is found as ever.
+        let one_each = (keypoints.are_shared())
+            .then(|| keypoints.one_each(order, score))
+            .filter(|one_each| one_each.len() >= needed && one_each.len() < order.len());
+        let observations = of(one_each.clone().unwrap_or_else(|| order.to_vec()));
+        let (mut poses, found) =
+            search(&observations, options, priors, rng.clone(), is_cancelled).into_result();
+        if is_cancelled() {
+            return Err(EstimateError::Cancelled);
+        }
+        let found = found.ok_or_else(|| no_pose(&observations, 0, 0.0))?;
+        if one_each.is_none() {
+            return conclude::conclude(&mut poses, &found, None, answer, options.max_false_alarms, &mut rng);
+        }
+        // Of the matches of a keypoint the one that agrees best.
+        let all = of(order.to_vec());
+        let nearest = nearest(&all, &found.best.motion);
+        let best_each = of(keypoints.one_each(order, |i| nearest[i]));
+        let mut poses = PoseScorer::new(&best_each, options.loss);
+        let blind = Some(&observations);
+        let mut found =
+            conclude::conclude(&mut poses, &found, blind, answer, options.max_false_alarms, &mut rng)?;
+        keypoints.mark_copies(&mut found.inliers);
+        found.inlier_count = found.inliers.iter().filter(|is| **is).count();
+        Ok(found)
+    }
+
+    /// Whether a pose has most of the matches that did not move within the threshold.
+    fn explains_most(&self, pose: &RelativePose, is_unmoved: &[bool]) -> bool {
+        let order: Vec<usize> = (0..self.matches.len()).filter(|&i| is_unmoved[i]).collect();
+        let count = order.len();
+        let all = Observations::new(self.matches, order, self.options.focal_lengths, self.options.threshold);
+        let direction = pose.t_21.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let motion = Motion { q_21: pose.q_21, direction };
+        2 * all.columns.agreeing(&motion, self.options.threshold).len() > count
+    }
+}
+
+/// How far each match, by its number, is from a motion: infinitely where it is out of reach or behind a camera.
+fn nearest(all: &Observations, motion: &Motion) -> Vec<f64> {
+    let mut residuals = Residuals::default();
+    all.columns.residuals(&motion.essential(), motion, &mut residuals);
+    let reach = REACH * all.columns.threshold();
+    let mut nearest = vec![f64::INFINITY; all.given];
+    for (place, (&index, r)) in all.order.iter().zip(&residuals.values).enumerate() {
+        if r.abs() < reach && residuals.is_in_front(place, 0) {
+            nearest[index] = r.abs();
+        }
+    }
+    nearest
+}
