@@ -1,7 +1,7 @@
 //! An estimate as a table.
 
 use comfy_table::{Cell, ColumnConstraint, Table};
-use quest_io::{EstimateRecord, PoseRecord, ThirdViewRecord};
+use quest_io::{EstimateRecord, FoundRecord, PoseRecord, ThirdViewRecord};
 
 use crate::table::{self, angle_axis, decimals, right, short, vector};
 
@@ -37,7 +37,7 @@ pub(crate) fn text(record: &EstimateRecord, unit: &str) -> Option<String> {
     let third = record.third_view.as_ref().map_or_else(String::new, third_view);
     Some(format!(
         "{}\n\nstandard deviation  R {} deg, t {}\nmedian residual     {} {unit} general, {} {unit} plane, {} {unit} rotation \
-         alone\nnoise               {} {unit}{third}",
+         alone\nnoise               {} {unit}{third}{}",
         table.trim_fmt(),
         short(deviation(0).to_degrees()),
         short(deviation(3)),
@@ -45,7 +45,26 @@ pub(crate) fn text(record: &EstimateRecord, unit: &str) -> Option<String> {
         size(evidence.planar_px),
         size(evidence.rotation_px),
         short(found.noise_px),
+        unusual(found),
     ))
+}
+
+/// A threshold that accepts more of the false matches than this is said.
+const UNUSUAL: f64 = 0.3;
+
+/// What a user should know of the matches and the threshold.
+fn unusual(found: &FoundRecord) -> String {
+    let unmoved = match found.unmoved {
+        0 => String::new(),
+        count => format!("\nset aside           {count} matches that did not move at all"),
+    };
+    if found.false_share < UNUSUAL {
+        return unmoved;
+    }
+    let percent = 100.0 * found.false_share;
+    format!(
+        "{unmoved}\nthreshold           accepts {percent:.0} % of false matches: is it in the unit of the points?"
+    )
 }
 
 /// What the third view decided.

@@ -65,6 +65,13 @@ pub struct FoundRecord {
     pub evidence: EvidenceRecord,
     /// The noise of the inliers, in pixels (without cameras, in units of the plane `z = 1`).
     pub noise_px: f64,
+    /// The normal of the plane in view 1 over its distance: `R_21 + t_21 normalᵀ` is its homography. `None` where the model is no
+    /// plane.
+    pub normal: Option<[f64; 3]>,
+    /// The share of false matches that the threshold accepts.
+    pub false_share: f64,
+    /// Matches that were set aside because they did not move at all.
+    pub unmoved: usize,
 }
 
 /// A pose, `X2 = R_21 X1 + t_21`.
@@ -200,6 +207,9 @@ impl FoundRecord {
             runner_up: estimate.runner_up.as_ref().map(|other| RunnerUpRecord::new(other, truth)),
             evidence: EvidenceRecord::new(&estimate.evidence),
             noise_px: estimate.noise_px,
+            normal: estimate.normal.map(|normal| normal.map(unsigned_zero)),
+            false_share: estimate.false_share,
+            unmoved: estimate.unmoved,
         }
     }
 }
