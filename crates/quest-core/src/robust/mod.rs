@@ -64,7 +64,7 @@ use crate::{Correspondence, Degeneracy, InputError};
 use conclude::{Answer, false_alarms};
 use data::observations::Observations;
 use pipeline::Task;
-use search::{Draws, Limits, Search, hypotheses, sampling};
+use search::{Draws, Limits, Search, hypotheses};
 
 /// Fewer matches than this have no pose.
 pub const MIN_MATCHES: usize = 5;
