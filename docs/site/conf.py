@@ -49,6 +49,8 @@ PAGES = {
     "docs/servoing.md": "servoing-results",
     "docs/servo-recipes.md": "guides/servoing",
     "docs/switching.md": "guides/switching",
+    "docs/colmap.md": "guides/colmap",
+    "docs/cluster.md": "guides/batches",
     "docs/errata.md": "errata",
     "benches/README.md": "benches",
     "benches/RESULTS.md": "speed",
