@@ -66,6 +66,13 @@ pub(crate) fn minors_with_q(m: &[Matrix4<f64>; 5]) -> [Quartic; 10] {
     out
 }
 
+/// The minor `det[q, M_i q, M_j q, M_k q]` of one triple.
+#[cfg(feature = "faer")]
+pub(crate) fn minor_with_q(triple: [&Matrix4<f64>; 3]) -> Quartic {
+    let [i, j, k] = triple;
+    determinant(&wedge(&Matrix4::identity(), i), &wedge(j, k))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::monomials::MONOMIALS;

@@ -21,6 +21,8 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, Vector3, Vector4};
 
 pub(crate) use constraint::ten_quartics;
 pub use constraint::{constraint_matrix, constraint_matrix_5};
+#[cfg(feature = "faer")]
+pub(crate) use minors::minor_with_q;
 pub(crate) use minors::{minors_with_q, minors_without_q};
 pub use monomials::MONOMIALS;
 

@@ -1,5 +1,7 @@
 //! The pose solvers, one file each, behind one small trait.
 
+#[cfg(feature = "faer")]
+mod literal;
 mod many_matches;
 mod published;
 mod quaternions;
@@ -8,6 +10,8 @@ pub(crate) mod shared;
 
 use std::str::FromStr;
 
+#[cfg(feature = "faer")]
+pub use literal::{quest_literal, relinearization_literal};
 pub use published::{eight_point, homography, kneip, kukelova, li_hartley, nister, stewenius};
 pub use quaternions::{quest_eigen, relinearization};
 
@@ -19,7 +23,11 @@ pub use li_hartley::LiHartley;
 pub use nister::Nister;
 pub use quest::Quest;
 pub use quest_eigen::QuestEigen;
+#[cfg(feature = "faer")]
+pub use quest_literal::QuestLiteral;
 pub use relinearization::Relinearization;
+#[cfg(feature = "faer")]
+pub use relinearization_literal::RelinearizationLiteral;
 pub use stewenius::Stewenius;
 
 use crate::{Candidates, Correspondence};
@@ -112,6 +120,12 @@ pub enum SolverName {
     Homography,
     /// [`EightPoint`].
     EightPoint,
+    /// [`QuestLiteral`].
+    #[cfg(feature = "faer")]
+    QuestLiteral,
+    /// [`RelinearizationLiteral`].
+    #[cfg(feature = "faer")]
+    RelinearizationLiteral,
 }
 
 /// What the table of solvers says of one.
@@ -129,14 +143,14 @@ pub struct SolverInfo {
 
 /// No solver has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no solver {found:?}, expected one of {}", SolverName::ALL.map(|s| s.info().name).join(", "))]
+#[error("there is no solver {found:?}, expected one of {}", SolverName::named().map(|s| s.info().name).collect::<Vec<_>>().join(", "))]
 pub struct UnknownSolver {
     /// The name that was asked for.
     pub found: String,
 }
 
 impl SolverName {
-    /// Every solver, in the order of the table; the first is the default.
+    /// Every solver of the table, in its order; the first is the default.
     pub const ALL: [Self; 10] = [
         Self::Quest,
         Self::QuestEigen,
@@ -149,6 +163,19 @@ impl SolverName {
         Self::Homography,
         Self::EightPoint,
     ];
+
+    /// The paper's two algorithms as it prints them: slow, for comparing with it. They have to be asked for by name.
+    #[cfg(feature = "faer")]
+    pub const LITERAL: [Self; 2] = [Self::QuestLiteral, Self::RelinearizationLiteral];
+
+    /// Every solver that has a name: [`Self::ALL`], and those of the feature `faer`.
+    pub fn named() -> impl Iterator<Item = Self> {
+        #[cfg(feature = "faer")]
+        let literal = Self::LITERAL;
+        #[cfg(not(feature = "faer"))]
+        let literal = [];
+        Self::ALL.into_iter().chain(literal)
+    }
 
     /// The table's row.
     #[must_use]
@@ -167,6 +194,12 @@ impl SolverName {
             Self::Kneip => of::<Kneip>(20, "Kneip, Siegwart, Pollefeys, ECCV 2012"),
             Self::Homography => of::<Homography>(4, "Ma, Soatto, Košecká, Sastry, 2004, section 5.3"),
             Self::EightPoint => of::<EightPoint>(2, "Hartley, PAMI 1997"),
+            #[cfg(feature = "faer")]
+            Self::QuestLiteral => of::<QuestLiteral>(20, "Fathian et al., RAS 2018, (41) to (44) as printed"),
+            #[cfg(feature = "faer")]
+            Self::RelinearizationLiteral => {
+                of::<RelinearizationLiteral>(20, "Fathian et al., RAS 2018, (45) to (55) as printed")
+            }
         }
     }
 
@@ -183,6 +216,10 @@ impl SolverName {
             Self::Kneip => Kneip { kinds }.solve(matches, out),
             Self::Homography => Homography.solve(matches, out),
             Self::EightPoint => EightPoint.solve(matches, out),
+            #[cfg(feature = "faer")]
+            Self::QuestLiteral => QuestLiteral { kinds }.solve(matches, out),
+            #[cfg(feature = "faer")]
+            Self::RelinearizationLiteral => RelinearizationLiteral { kinds }.solve(matches, out),
         }
     }
 }
@@ -197,7 +234,7 @@ impl FromStr for SolverName {
     type Err = UnknownSolver;
 
     fn from_str(name: &str) -> Result<Self, UnknownSolver> {
-        let found = Self::ALL.into_iter().find(|s| s.info().name == name);
+        let found = Self::named().find(|s| s.info().name == name);
         found.ok_or_else(|| UnknownSolver { found: name.to_owned() })
     }
 }

@@ -80,7 +80,7 @@ const MIXINGS: [[[f64; 4]; 4]; 2] = [
 
 /// The essential matrices that satisfy the constraints of the matches, in the least-squares sense for more than five;
 /// the last one does so best.
-fn null_space(matches: &[Correspondence]) -> Result<Basis, Degeneracy> {
+pub(crate) fn null_space(matches: &[Correspondence]) -> Result<Basis, Degeneracy> {
     let row = |m: &Correspondence| outer(m.bearing2(), m.bearing1());
     let (basis, independent) = if let Ok(five) = <&[Correspondence; 5]>::try_from(matches) {
         let (basis, pivot) = null_space::null_space(&five.each_ref().map(row));
