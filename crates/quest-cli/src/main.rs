@@ -10,6 +10,7 @@ mod estimate_table;
 mod in_order;
 mod input;
 mod options;
+mod polynomials;
 mod progress;
 mod rows;
 mod servo;
@@ -55,6 +56,7 @@ enum Command {
     View(Box<view::Arguments>),
     #[cfg(feature = "colmap")]
     Colmap(Box<colmap::Arguments>),
+    Polynomials(Box<polynomials::Arguments>),
     Solvers(solvers::Arguments),
 }
 
@@ -92,6 +94,7 @@ fn main() -> ExitCode {
         Command::View(arguments) => view::run(&arguments),
         #[cfg(feature = "colmap")]
         Command::Colmap(arguments) => colmap::run(&arguments),
+        Command::Polynomials(arguments) => polynomials::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
     };
     match result {

@@ -117,6 +117,6 @@ pub(crate) fn loss_parser() -> impl clap::builder::TypedValueParser<Value = Sear
 /// A solver by its name, with the names listed in the help.
 pub(crate) fn solver_parser() -> impl clap::builder::TypedValueParser<Value = SolverName> {
     use clap::builder::{PossibleValuesParser, TypedValueParser};
-    PossibleValuesParser::new(SolverName::ALL.map(|s| s.info().name))
+    PossibleValuesParser::new(SolverName::named().map(|s| s.info().name))
         .try_map(|name| name.parse::<SolverName>())
 }

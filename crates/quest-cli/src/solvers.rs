@@ -22,6 +22,10 @@ real solutions as poses, with their scale and rank. The 100 scenes are realistic
 homography), with 0.75 px of noise and as few matches as the solver needs. Other load on the machine
 makes the time longer.
 
+Not in the table are quest-literal and relinearization-literal, the paper's two algorithms as it prints
+them, on dense matrices: they find the same solutions more slowly, and lose some of those with little
+parallax; quest-literal also loses half turns. They are for comparing with the paper, by their names.
+
 Examples:
   quest-cli solvers
   quest-cli solvers --format json

@@ -6,6 +6,7 @@ mod candidates;
 mod estimate;
 mod formats;
 mod output;
+mod polynomials;
 mod readme;
 mod servo;
 mod simulate;
