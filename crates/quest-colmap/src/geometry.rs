@@ -102,6 +102,7 @@ impl TwoViewGeometry {
         let Some(direction) = direction else {
             let pose = RelativePose::new(pose.q_21, Vector3::zeros());
             let homography = ks.and_then(|ks| of_pixels(&pose.r_21(), ks));
+            let inliers = turned_alone(&pose, rays, inliers);
             return Self { homography, pose: Some(pose), ..Self::of_pixels(Config::Panoramic, inliers) };
         };
         let pose = RelativePose::new(pose.q_21, direction);
@@ -137,6 +138,23 @@ pub(crate) fn calibrations(cameras: [&Camera; 2]) -> Option<[Matrix3<f64>; 2]> {
 /// `K2 H K1⁻¹`.
 fn of_pixels(h: &Matrix3<f64>, [k1, k2]: [Matrix3<f64>; 2]) -> Option<Matrix3<f64>> {
     Some(k2 * h * k1.try_inverse()?)
+}
+
+/// A match further from a rotation than so many medians is a false one: seven standard deviations of noise in both coordinates,
+/// whose median length is 1.18 of them.
+const FALSE: f64 = 6.0;
+
+/// The inliers that the rotation explains too. An estimate keeps those on their epipolar lines, of which a few are false; readers
+/// of the row transfer them by its homography.
+fn turned_alone(pose: &RelativePose, rays: &[Correspondence], inliers: Matches) -> Matches {
+    if rays.len() != inliers.0.len() || rays.is_empty() {
+        return inliers;
+    }
+    let angles: Vec<f64> = rays.iter().map(|m| (pose.q_21 * m.bearing1()).angle(m.bearing2())).collect();
+    let mut sorted = angles.clone();
+    let (_, median, _) = sorted.select_nth_unstable_by(angles.len() / 2, f64::total_cmp);
+    let reach = (FALSE * *median).max(f64::EPSILON.sqrt());
+    Matches(inliers.0.into_iter().zip(angles).filter(|(_, angle)| *angle <= reach).map(|(m, _)| m).collect())
 }
 
 /// Rounds in which matches off the plane lose their weight.

@@ -18,6 +18,8 @@ mod small_motion;
 
 use rand_chacha::ChaCha8Rng;
 
+pub(crate) use report::Answer;
+
 use crate::robust::conclude::alternatives::{alternatives, better_of};
 use crate::robust::conclude::chance_inliers::refine_without_chance;
 use crate::robust::conclude::false_alarms::Chance;
@@ -33,15 +35,6 @@ use crate::robust::search::pose_score::PoseScorer;
 use crate::robust::search::search_score::MANY;
 use crate::robust::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
 use crate::{Degeneracy, InputError};
-
-/// Which of two poses that explain the matches is given as the answer, the other being the runner-up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
-    /// The one that explains them better.
-    Best,
-    /// The other, because something else is known.
-    Other,
-}
 
 /// Steps 3 to 6: the estimate that the result of the search leads to. `blind` are the matches of the search where they are others:
 /// those of which none was chosen because it agrees, by which chance is judged.

@@ -4,7 +4,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::RelativePose;
 use crate::robust::MIN_MATCHES;
-use crate::robust::conclude::Answer;
+
 use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plane, second_of_few};
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
@@ -21,6 +21,15 @@ use crate::robust::search::pose_score::{PoseScorer, Scored};
 use crate::robust::search::search_score::MANY;
 use crate::solver::shared::motion::Motion;
 use crate::structure::translation_direction;
+
+/// Which of two poses that explain the matches is given as the answer, the other being the runner-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// The one that explains them better.
+    Best,
+    /// The other, because something else is known.
+    Other,
+}
 
 /// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
 const NEAR_POINT: f64 = 3.0;
