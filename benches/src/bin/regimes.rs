@@ -5,7 +5,6 @@
 #![expect(clippy::print_stdout, reason = "a program for people: tables are its output")]
 
 use std::convert::Infallible;
-use std::error::Error;
 
 use clap::{Parser, ValueEnum};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -58,7 +57,7 @@ enum Name {
     FalsePoses,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() {
     let arguments = Arguments::parse();
     println!("{} scenes a row, seed {}", arguments.scenes, arguments.seed);
     for name in &arguments.tables {
@@ -71,7 +70,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             Name::FalsePoses => arguments.of_false_poses(),
         }
     }
-    Ok(())
 }
 
 /// Matches and the pose that they were made with.
