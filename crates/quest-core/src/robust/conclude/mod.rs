@@ -14,6 +14,7 @@ mod mixture;
 mod model;
 mod plane;
 mod report;
+mod rotation_alone;
 mod small_motion;
 
 use rand_chacha::ChaCha8Rng;

@@ -7,7 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::robust::conclude::evidence::{Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
-use crate::robust::conclude::model::{NOT_A_ROTATION, excess, rotation_alone};
+use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, rotation_alone};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::search::pose_score::PoseScorer;
