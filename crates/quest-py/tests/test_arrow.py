@@ -93,12 +93,17 @@ def test_other_forms_go_in_as_they_are() -> None:
     assert one.column("pair").to_pylist() == [5, 6, 7]
 
 
+def shortened(t: Any) -> Any:
+    compute = pytest.importorskip("pyarrow.compute")
+    return t.set_column(2, "x2", compute.list_slice(t.column("x2"), 0, 3))
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         (lambda t: t.drop_columns(["x2"]), "x2"),
         (lambda t: t.set_column(1, "x1", t.column("score")), "fixed_size_list"),
-        (lambda t: t.set_column(2, "x2", t.slice(1, 1).column("x2")), "differ in length"),
+        (shortened, "differ in length"),
         (lambda t: t.drop_columns(["params1"]), "params1"),
     ],
 )

@@ -85,7 +85,8 @@ def test_keys_make_answers_independent_of_the_other_pairs() -> None:
     part = qp.estimate_batch(x1[60:90], x2[60:90], [0, 30], K, indices=keys[2:3])
     assert part[0] == whole[2]
     assert whole[0] == qp.estimate(x1[:30], x2[:30], K, index=7)
-    for bad, word in [(keys[:2], "indices has 2"), ([-1] * 6, "negative"), ([0.5] * 6, "whole")]:
+    refused: list[tuple[Any, str]] = [(keys[:2], "indices has 2"), ([-1] * 6, "negative"), ([0.5] * 6, "whole")]
+    for bad, word in refused:
         with pytest.raises(qp.QuestError, match=word):
             qp.estimate_batch(x1, x2, offsets, K, indices=bad)
 

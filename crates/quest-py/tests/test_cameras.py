@@ -153,7 +153,7 @@ def test_covariances_in_other_conventions() -> None:
         columns = [error(convention, step * e) - error(convention, -step * e) for e in np.eye(6)]
         jacobian = np.array(columns).T / (2 * step)
         expected = jacobian @ est.covariance @ jacobian.T
-        found = est.covariance_as(convention)  # type: ignore[arg-type]
+        found = est.covariance_as(convention)
         # Central differences of step 1e-5 are exact to its square.
         np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
     np.testing.assert_array_equal(est.covariance_as("additive"), est.covariance)

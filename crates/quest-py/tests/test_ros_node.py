@@ -214,7 +214,9 @@ def test_a_robot_gets_its_controller() -> None:
 def test_an_arm_may_command_its_hand() -> None:
     turned = [0.1, 0.2, 0.3, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     _, options = pilot.Settings(camera_in_hand=turned).check().controller()
-    np.testing.assert_allclose(options["camera_in_hand"], [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]], atol=1e-15)
+    hand: Any = options["camera_in_hand"]
+    wanted = np.array([[0.0, -1.0, 0.0, 0.1], [1.0, 0.0, 0.0, 0.2], [0.0, 0.0, 1.0, 0.3], [0.0, 0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(hand, wanted, atol=1e-15)
     assert "camera_in_hand" not in pilot.Settings().controller()[1]
     with pytest.raises(ValueError, match="camera_in_hand is .*, expected x, y, z and a unit quaternion"):
         pilot.Settings(camera_in_hand=[0.0] * 7).check()

@@ -47,8 +47,12 @@ def test_frozen(value: Any) -> None:
     for name in [*(n for n in dir(value) if not n.startswith("_")), "new"]:
         with pytest.raises(AttributeError):
             setattr(value, name, 1)
+
+
+def test_cameras_are_keys_and_candidates_are_not() -> None:
+    assert hash(CAMERA) == hash(eval(repr(CAMERA), {"Camera": qp.Camera}))
     with pytest.raises(TypeError, match="unhashable"):
-        hash(value)
+        hash(CANDIDATES[0])
 
 
 def test_camera() -> None:

@@ -189,7 +189,7 @@ def _record_batch(pa: Any, keys: Any, found: EstimateBatch) -> Any:
     other = np.isnan(found.runner_up_t[:, 0]) if len(found) else absent
 
     def vectors(values: Any, mask: Any) -> Any:
-        flat = np.ascontiguousarray(values).reshape(len(found), -1)
+        flat = np.ascontiguousarray(values).reshape(len(found), values.shape[1])
         numbers = pa.array(flat.ravel())
         return pa.FixedSizeListArray.from_arrays(numbers, flat.shape[1], mask=pa.array(mask))
 
