@@ -19,7 +19,7 @@ Detected: TypeAlias = tuple[ArrayLike, ArrayLike]
 Detector: TypeAlias = Callable[[Image], Detected]
 
 NOISE = {"sift": 0.5, "orb": 1.0}
-"""Standard deviation of a matched coordinate in pixels, as measured on rendered scenes (docs/servoing.md)."""
+"""Standard deviation of a matched coordinate in pixels: the order of size on rendered scenes."""
 
 APART = 3.0
 """Keypoints closer than so many pixels are one place: neighbouring levels of a pyramid find a corner twice."""

@@ -15,7 +15,7 @@ FEWEST = 6
 """A loop never acts on fewer."""
 
 LEAST_COVERAGE = 0.05
-"""Below, tilt and translation cannot be told apart within the noise of features (docs/servoing.md)."""
+"""Below, tilt and translation cannot be told apart within the noise of features."""
 
 
 class GoalImage:
