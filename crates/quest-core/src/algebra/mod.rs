@@ -1,9 +1,10 @@
-//! Small dense linear algebra and polynomials, without heap; imports nothing of the crate.
+//! Small dense linear algebra, descents and polynomials, without heap; imports nothing of the crate.
 //!
 //! Each routine stands here because a library's, at these sizes, costs several times as much (ARCHITECTURE.md
 //! has the measurements); the tests hold it against the library's.
 
 pub(crate) mod cholesky;
+pub(crate) mod descent;
 pub(crate) mod eigenvalues;
 pub(crate) mod elimination;
 pub(crate) mod monomials;

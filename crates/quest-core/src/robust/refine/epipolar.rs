@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix5, Vector5};
 
+use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
 use crate::algebra::vectors::widest::{Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::robust::data::columns::Columns;
@@ -238,6 +239,16 @@ pub(crate) fn fundamental(e: &Matrix3<f64>, d1: &[f64; 3], d2: &[f64; 3]) -> [f6
     std::array::from_fn(|k| d2[k / 3] * e[(k / 3, k % 3)] * d1[k % 3])
 }
 
+/// A start comes from a sample or from an earlier descent, so that nearly all of a Gauss–Newton step is wanted.
+const SCHEDULE: Schedule = Schedule {
+    first: 1e-4,
+    least: 1e-10,
+    negligible: 1e-10,
+    refused: 0.0,
+    most: 1e4,
+    singular: Singular::IsDamped,
+};
+
 /// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, with at most so many steps.
 pub(crate) fn refine(
     subset: &Subset,
@@ -246,33 +257,41 @@ pub(crate) fn refine(
     until: f64,
     max_steps: usize,
 ) {
-    let mut damping = 1e-4;
-    let mut current = subset.equations(motion, loss);
-    for _ in 0..max_steps {
-        let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else {
-            damping *= 10.0;
-            if damping > 1e4 {
-                break;
-            }
-            continue;
-        };
-        let trial = motion.stepped(&tangent_basis(&motion.direction), &step.into());
-        let expected = -current.gradient.dot(&step);
-        let is_last =
-            expected * subset.len as f64 <= until * current.cost || step.norm_squared() < SHORT * SHORT;
-        if is_last {
-            *motion = trial;
-            break;
+    let current = subset.equations(motion, loss);
+    descend(&mut Refinement { subset, loss, until, motion, current }, &SCHEDULE, max_steps);
+}
+
+/// A motion on its way.
+struct Refinement<'a, L> {
+    subset: &'a Subset,
+    loss: &'a L,
+    until: f64,
+    motion: &'a mut Motion,
+    /// At the motion.
+    current: Equations,
+}
+
+impl<L: RobustLoss> Descent for Refinement<'_, L> {
+    type Step = Vector5<f64>;
+
+    fn step(&mut self, damping: f64) -> Option<Vector5<f64>> {
+        damped_step(&self.current.hessian, &self.current.gradient, damping)
+    }
+
+    fn attempt(&mut self, step: &Vector5<f64>) -> Outcome {
+        let Self { subset, loss, until, .. } = *self;
+        let trial = self.motion.stepped(&tangent_basis(&self.motion.direction), &(*step).into());
+        let expected = -self.current.gradient.dot(step);
+        if expected * subset.len as f64 <= until * self.current.cost || step.norm_squared() < SHORT * SHORT {
+            *self.motion = trial;
+            return Outcome::Over;
         }
         let next = subset.equations(&trial, loss);
-        if next.cost < current.cost {
-            (*motion, current) = (trial, next);
-            damping = (0.1 * damping).max(1e-10);
+        if next.cost < self.current.cost {
+            (*self.motion, self.current) = (trial, next);
+            Outcome::Lower
         } else {
-            damping *= 10.0;
-            if damping > 1e4 {
-                break;
-            }
+            Outcome::Refused
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
+use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
 use crate::algebra::vectors::widest::{Work, widest};
 use crate::robust::data::point_transfer::{Framed, Lanes, WIDTH, rows, whitened};
 use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
@@ -118,41 +119,71 @@ impl<const P: usize, L: RobustLoss, R: Parameters<P>> Work for Accumulation<'_, 
     }
 }
 
-/// Levenberg–Marquardt; `at` gives the equations of a model, `moved` makes a step. The cost before the last step.
-fn minimise<const P: usize, M: Clone>(
+/// A start comes from a sample or from the pose, so that nearly all of a Gauss–Newton step is wanted.
+const SCHEDULE: Schedule = Schedule {
+    first: 1e-3,
+    least: 1e-9,
+    negligible: 1e-9,
+    refused: 0.0,
+    most: 1e5,
+    singular: Singular::Ends,
+};
+
+/// A model on its way: `at` gives its equations, `moved` makes a step.
+struct Refinement<'a, const P: usize, M, A, S> {
+    model: &'a mut M,
+    count: usize,
+    at: A,
+    moved: S,
+    /// At the model.
+    current: Equations<P>,
+}
+
+impl<const P: usize, M, A, S> Descent for Refinement<'_, P, M, A, S>
+where
+    A: Fn(&M) -> Equations<P>,
+    S: Fn(&M, &SVector<f64, P>) -> M,
+{
+    type Step = SVector<f64, P>;
+
+    fn step(&mut self, damping: f64) -> Option<SVector<f64, P>> {
+        let mut damped = self.current.hessian;
+        // The scale of a homography is free: a little of the trace holds it.
+        let free = 1e-12 * self.current.hessian.trace();
+        for k in 0..P {
+            damped[(k, k)] += damping * damped[(k, k)] + free;
+        }
+        Some(-nalgebra::Cholesky::new(damped)?.solve(&self.current.gradient))
+    }
+
+    fn attempt(&mut self, step: &SVector<f64, P>) -> Outcome {
+        let trial = (self.moved)(self.model, step);
+        if -self.current.gradient.dot(step) * self.count as f64 <= FINE * self.current.cost {
+            *self.model = trial;
+            return Outcome::Over;
+        }
+        let next = (self.at)(&trial);
+        if next.cost < self.current.cost {
+            (*self.model, self.current) = (trial, next);
+            Outcome::Lower
+        } else {
+            Outcome::Refused
+        }
+    }
+}
+
+/// Descends by at most so many steps. The cost before the last of them.
+fn minimise<const P: usize, M>(
     model: &mut M,
     count: usize,
     max_steps: usize,
     at: impl Fn(&M) -> Equations<P>,
     moved: impl Fn(&M, &SVector<f64, P>) -> M,
 ) -> f64 {
-    let (mut damping, mut current) = (1e-3, at(model));
-    for _ in 0..max_steps {
-        let mut damped = current.hessian;
-        // The scale of a homography is free: a little of the trace holds it.
-        let free = 1e-12 * current.hessian.trace();
-        for k in 0..P {
-            damped[(k, k)] += damping * damped[(k, k)] + free;
-        }
-        let Some(factor) = nalgebra::Cholesky::new(damped) else { break };
-        let step = -factor.solve(&current.gradient);
-        let trial = moved(model, &step);
-        if -current.gradient.dot(&step) * count as f64 <= FINE * current.cost {
-            *model = trial;
-            break;
-        }
-        let next = at(&trial);
-        if next.cost < current.cost {
-            (*model, current) = (trial, next);
-            damping = (0.1_f64 * damping).max(1e-9);
-        } else {
-            damping *= 10.0;
-            if damping.is_nan() || damping > 1e5 {
-                break;
-            }
-        }
-    }
-    current.cost
+    let current = at(model);
+    let mut refinement = Refinement { model, count, at, moved, current };
+    descend(&mut refinement, &SCHEDULE, max_steps);
+    refinement.current.cost
 }
 
 /// Refines a homography of any scale over some of the matches.

@@ -7,12 +7,13 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::Correspondence;
+use crate::algebra::descent::{FALL, RISE};
 use crate::algebra::vectors::two::{Two, TwoVectors, both, dot};
 use crate::pose::RIGHT_ANGLE;
-use crate::solver::shared::motion::{AT_EPIPOLE, Motion, Until, constraint, sampson_row};
+use crate::solver::shared::motion::{AT_EPIPOLE, Motion, SCHEDULE, Until, constraint, sampson_row};
 
-/// Levenberg–Marquardt from two motions to local minima of the summed squares of the Sampson errors. Returns the sums before
-/// the last step.
+/// Levenberg–Marquardt from two motions to local minima of the summed squares of the Sampson errors, by the [`SCHEDULE`] of one:
+/// the loop of [`descent`](crate::algebra::descent) with a mask in place of each branch. Returns the sums before the last step.
 pub(crate) fn minimise_sampson(
     motions: &mut [Motion; 2],
     matches: &[Correspondence],
@@ -21,7 +22,7 @@ pub(crate) fn minimise_sampson(
     let beyond_five = matches.len().saturating_sub(5).max(1) as f64;
     let mut frames = Frames::new(motions);
     let mut current = frames.equations(matches);
-    let (mut damping, mut is_over) = (Two::ZERO, Two::ZERO);
+    let (mut damping, mut is_over) = (Two::splat(SCHEDULE.first), Two::ZERO);
     for _ in 0..until.steps {
         let (step, is_step) = damped_step(&current, damping);
         let trial = frames.moved(&step);
@@ -47,8 +48,8 @@ pub(crate) fn minimise_sampson(
                 *x = accepted.select(*next, *x);
             }
         }
-        damping = is_better.select(damping * 0.1, (damping * 10.0).max(Two::splat(1e-3)));
-        is_over |= damping.simd_gt(Two::splat(1e3));
+        damping = is_better.select(damping * FALL, (damping * RISE).max(Two::splat(SCHEDULE.refused)));
+        is_over |= damping.simd_gt(Two::splat(SCHEDULE.most));
     }
     *motions = frames.motions();
     current[5][5].to_array()

@@ -12,6 +12,7 @@
 use nalgebra::{Matrix5, Quaternion, UnitQuaternion, Vector3, Vector5};
 
 use crate::Correspondence;
+use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
 use crate::algebra::vectors::two::{Two, TwoVectors, side_by_side};
 use crate::epipolar_frame::EpipolarFrame;
 use crate::pose::{RIGHT_ANGLE, sampson_square};
@@ -130,29 +131,10 @@ impl Motion {
         beyond_five: f64,
         until: &Until,
     ) -> f64 {
-        let mut damping = 0.0;
-        let mut current = equations(self);
-        for _ in 0..until.steps {
-            let Some(step) = damped_step(&current.hessian, &current.gradient, damping) else { break };
-            let trial = self.moved(&current.frame, &step.into());
-            // To first order the cost falls by the step's square in units of the noise times its variance.
-            let fall = -step.dot(&current.gradient);
-            if step.norm() < until.step || fall * beyond_five < until.within_noise * current.cost {
-                *self = trial;
-                break;
-            }
-            let next = equations(&trial);
-            if next.cost < current.cost {
-                (*self, current) = (trial, next);
-                damping *= 0.1;
-            } else {
-                damping = (10.0 * damping).max(1e-3);
-                if damping > 1e3 {
-                    break;
-                }
-            }
-        }
-        current.cost
+        let current = equations(self);
+        let mut descending = Descending { motion: self, equations, beyond_five, until, current };
+        descend(&mut descending, &SCHEDULE, until.steps);
+        descending.current.cost
     }
 
     /// The sum of the squared Sampson errors, none of them counted beyond `cutoff`, and the equations of a step.
@@ -195,6 +177,46 @@ impl Motion {
             sampson_square(b[0] * c[1] - b[1] * c[0], b[2], c[2]).min(limit)
         };
         matches.iter().map(square).sum()
+    }
+}
+
+/// A start is a solution of some or all of the constraints: the first step is Gauss–Newton's own.
+pub(crate) const SCHEDULE: Schedule =
+    Schedule { first: 0.0, least: 0.0, negligible: 0.0, refused: 1e-3, most: 1e3, singular: Singular::Ends };
+
+/// A motion on its way.
+struct Descending<'a, F> {
+    motion: &'a mut Motion,
+    equations: F,
+    beyond_five: f64,
+    until: &'a Until,
+    /// At the motion.
+    current: Equations,
+}
+
+impl<F: Fn(&Motion) -> Equations> Descent for Descending<'_, F> {
+    type Step = Vector5<f64>;
+
+    fn step(&mut self, damping: f64) -> Option<Vector5<f64>> {
+        damped_step(&self.current.hessian, &self.current.gradient, damping)
+    }
+
+    fn attempt(&mut self, step: &Vector5<f64>) -> Outcome {
+        let Self { current, until, .. } = self;
+        let trial = self.motion.moved(&current.frame, &(*step).into());
+        // To first order the cost falls by the step's square in units of the noise times its variance.
+        let fall = -step.dot(&current.gradient);
+        if step.norm() < until.step || fall * self.beyond_five < until.within_noise * current.cost {
+            *self.motion = trial;
+            return Outcome::Over;
+        }
+        let next = (self.equations)(&trial);
+        if next.cost < current.cost {
+            (*self.motion, self.current) = (trial, next);
+            Outcome::Lower
+        } else {
+            Outcome::Refused
+        }
     }
 }
 

@@ -14,6 +14,7 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
 use crate::algebra::cholesky;
+use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
 use crate::servo::estimators::depth_filter::reference::DepthReference;
 
 /// The weight γ of the unit: a thousand times the information that one frame may have.
@@ -22,6 +23,21 @@ const UNIT_WEIGHT: f64 = 1e10;
 const NEAREST: f64 = 1e-3;
 /// Steps of a fit from a candidate: seven are usual.
 pub(crate) const MAX_STEPS: usize = 20;
+/// A fit is at its minimum once a step lowers χ² by no more than this share of it, or by no more than this.
+const SETTLED: f64 = 1e-4;
+const SETTLED_AT_ALL: f64 = 1e-9;
+/// A refused step shorter than this (radians, units of length) is at the minimum, to rounding.
+const SHORT: f64 = 1e-12;
+
+/// A fit begins at the last image's pose, or at a candidate: the first step is Gauss–Newton's own.
+const SCHEDULE: Schedule = Schedule {
+    first: 0.0,
+    least: 0.0,
+    negligible: 1e-6,
+    refused: 1e-4,
+    most: 1e6,
+    singular: Singular::IsDamped,
+};
 
 /// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,50 +121,17 @@ impl Workspace {
     ) -> Option<Fitted> {
         self.steps = 0;
         self.inverse_depths.copy_from_slice(inverse_depths);
-        let mut pose = start;
-        let mut cost = self.cost(problem, &pose)?;
-        self.linearise(problem, &pose);
-        let (mut damping, mut is_refused) = (0.0, false);
-        for _ in 0..most_steps {
-            self.steps += 1;
-            let Some(step) = self.solve(problem.reference, damping) else {
-                damping = f64::max(10.0 * damping, 1e-4);
-                continue;
-            };
-            let moved = moved(&pose, &step);
-            let kept = std::mem::take(&mut self.inverse_depths);
-            self.inverse_depths = std::mem::take(&mut self.trial);
-            for ((new, old), by) in self.inverse_depths.iter_mut().zip(&kept).zip(&self.step) {
-                *new = old + by;
-            }
-            let new = self.cost(problem, &moved);
-            is_refused = new.is_none_or(|new| new > cost);
-            match new {
-                Some(new) if !is_refused => {
-                    self.trial = kept;
-                    let change = cost - new;
-                    (pose, cost) = (moved, new);
-                    self.linearise(problem, &pose);
-                    damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
-                    if change <= 1e-4 * cost + 1e-9 {
-                        break;
-                    }
-                }
-                _ => {
-                    self.trial = std::mem::replace(&mut self.inverse_depths, kept);
-                    damping = f64::max(10.0 * damping, 1e-4);
-                    // No smaller cost in the direction of the gradient: this is the minimum, to rounding.
-                    if damping > 1e6 || step.norm() < 1e-12 {
-                        break;
-                    }
-                }
-            }
-        }
+        let cost = self.cost(problem, &start)?;
+        self.linearise(problem, &start);
+        let fitted = Fitted { pose: start, cost };
+        let mut fitting = Fitting { workspace: self, problem, fitted, is_refused: false };
+        descend(&mut fitting, &SCHEDULE, most_steps);
+        let Fitting { fitted, is_refused, .. } = fitting;
         if is_refused {
-            // The residuals are to be those of the pose that is returned.
-            self.cost(problem, &pose)?;
+            // The residuals must be those of the pose that is returned.
+            self.cost(problem, &fitted.pose)?;
         }
-        Some(Fitted { pose, cost })
+        Some(fitted)
     }
 
     /// The residuals and the cost, at the workspace's inverse depths; `None` where a seen point is behind the camera.
@@ -294,6 +277,45 @@ impl Workspace {
         for (rho, step) in reference.inverse_depths.iter_mut().zip(&self.step) {
             *rho += step;
         }
+    }
+}
+
+/// A fit on its way: a pose, and the inverse depths of the workspace.
+struct Fitting<'a, 'p> {
+    workspace: &'a mut Workspace,
+    problem: &'a Problem<'p>,
+    fitted: Fitted,
+    /// Whether the last step was refused, so that the workspace's residuals are of another pose.
+    is_refused: bool,
+}
+
+impl Descent for Fitting<'_, '_> {
+    type Step = Vector6<f64>;
+
+    fn step(&mut self, damping: f64) -> Option<Vector6<f64>> {
+        self.workspace.steps += 1;
+        self.workspace.solve(self.problem.reference, damping)
+    }
+
+    fn attempt(&mut self, step: &Vector6<f64>) -> Outcome {
+        let Self { workspace, problem, fitted, .. } = self;
+        let pose = moved(&fitted.pose, step);
+        let kept = std::mem::take(&mut workspace.inverse_depths);
+        workspace.inverse_depths = std::mem::take(&mut workspace.trial);
+        for ((new, old), by) in workspace.inverse_depths.iter_mut().zip(&kept).zip(&workspace.step) {
+            *new = old + by;
+        }
+        let new = workspace.cost(problem, &pose).filter(|new| *new <= fitted.cost);
+        self.is_refused = new.is_none();
+        let Some(cost) = new else {
+            workspace.trial = std::mem::replace(&mut workspace.inverse_depths, kept);
+            return if step.norm() < SHORT { Outcome::Over } else { Outcome::Refused };
+        };
+        workspace.trial = kept;
+        workspace.linearise(problem, &pose);
+        let change = fitted.cost - cost;
+        *fitted = Fitted { pose, cost };
+        if change <= SETTLED * cost + SETTLED_AT_ALL { Outcome::Over } else { Outcome::Lower }
     }
 }
 
