@@ -2,9 +2,10 @@
 
 mod charts;
 mod frame;
+mod replay;
 mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use quest_core::Camera;
@@ -29,8 +30,23 @@ Examples:
   quest-cli servo --scenario robot --noise 0.5 -o run.csv    every image of a robot's run
   quest-cli servo --scenario random --features 20 --noise 1 --seed 7
   quest-cli servo --scenario robot --translation unit        what a translation without length does
+  quest-cli servo --replay run.npz --plot run.html           a live run that quest_pose.servo.Recorder wrote
 
 Exit status: 0 the goal was reached (within 2 cm and 1 degree), 1 it was not, 2 bad arguments.";
+
+/// What a live run has no use for.
+const SIMULATED: [&str; 10] = [
+    "scenario",
+    "solver",
+    "noise",
+    "seed",
+    "features",
+    "coplanar",
+    "goal_images",
+    "delay",
+    "rule",
+    "translation",
+];
 
 /// Moves a simulated camera or robot to its goal by the poses of its images.
 #[derive(Args, Debug)]
@@ -66,6 +82,9 @@ pub(crate) struct Arguments {
     /// The length of the translation; others than goal-depths choose by --rule in each image.
     #[arg(long, value_enum, default_value_t = Translation::GoalDepths)]
     translation: Translation,
+    /// Show a live run instead of simulating one: a file of `quest_pose.servo.Recorder`.
+    #[arg(long, value_name = "RUN.npz", conflicts_with_all = SIMULATED)]
+    replay: Option<PathBuf>,
     /// Draw the run (figures 9, 10 and 12 to 19 of the paper); for the robot with the paths from five more starts.
     #[arg(long, value_name = "FILE.svg|html", value_parser = parse_plot)]
     plot: Option<Plot>,
@@ -136,6 +155,9 @@ struct Run {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    if let Some(path) = &arguments.replay {
+        return replay::run(path, arguments.plot.as_ref(), &arguments.output);
+    }
     let mut output = arguments.output.open()?;
     let plot = match &arguments.plot {
         Some(plot) => Some((plot, Output::open(Some(Path::new(&plot.path)))?)),

@@ -8,6 +8,7 @@ mod formats;
 mod output;
 mod polynomials;
 mod readme;
+mod replay;
 mod servo;
 mod simulate;
 mod view;

@@ -96,10 +96,16 @@ fn plot(class: &str, title: &str, plot: &Plot) -> Result<String, PlotError> {
     ))
 }
 
+/// A cell with more characters holds a sentence, which may be broken into lines.
+const LONG: usize = 40;
+
 fn table_section(caption: &str, rows: &[Vec<String>]) -> String {
     let row = |cells: &Vec<String>, tag: &str| {
-        let cells: Vec<String> = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escaped(c))).collect();
-        format!("<tr>{}</tr>\n", cells.concat())
+        let cell = |text: &String| {
+            let class = if text.chars().count() > LONG { " class=\"words\"" } else { "" };
+            format!("<{tag}{class}>{}</{tag}>", escaped(text))
+        };
+        format!("<tr>{}</tr>\n", cells.iter().map(cell).collect::<String>())
     };
     let header = rows.first().map(|r| row(r, "th")).unwrap_or_default();
     let body: String = rows.iter().skip(1).map(|r| row(r, "td")).collect();
