@@ -45,7 +45,7 @@ mod _core {
     #[pymodule_export]
     use crate::estimate_result::{_estimate, _runner_up, Estimate, RunnerUp};
     #[pymodule_export]
-    use crate::servo::{_command, CameraServo, Command, RobotServo};
+    use crate::servo::{_command, CameraServo, Command, Controller, RobotServo, joint_velocities};
     #[pymodule_export]
     use crate::solve::{_solvers, constraint_matrix, solve};
     #[pymodule_export]

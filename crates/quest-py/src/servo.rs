@@ -1,14 +1,20 @@
 //! `quest_pose.servo`: one image in, one command out.
 
 mod command;
+mod controller;
 mod given;
+mod joints;
 
-use numpy::{PyArray1, ToPyArray};
+use std::sync::{Arc, Mutex};
+
 use pyo3::prelude::*;
 use quest_core::servo::{Axes, DifferentialDriveLaw, FreeCameraLaw, Mount, Plane};
 
 pub(crate) use self::command::{_command, Command};
+pub(crate) use self::controller::Controller;
+use self::controller::locked;
 use self::given::{Given, Loop, positive};
+pub(crate) use self::joints::joint_velocities;
 use crate::errors::QuestError;
 
 /// A controller that moves a free camera, on an arm or a quadrotor, to where the goal image was taken.
@@ -63,9 +69,9 @@ use crate::errors::QuestError;
 /// TooFewMatches, ShapeMismatch, NotFinite, BadCamera, QuestError
 ///     For too few features, arrays of other shapes, features without a viewing ray, impossible cameras, and numbers
 ///     that are not positive.
-#[pyclass(module = "quest_pose.servo")]
+#[pyclass(extends = Controller, frozen, module = "quest_pose.servo")]
 #[derive(Debug)]
-pub(crate) struct CameraServo(Loop<FreeCameraLaw>);
+pub(crate) struct CameraServo(Arc<Mutex<Loop<FreeCameraLaw>>>);
 
 #[pymethods]
 impl CameraServo {
@@ -95,7 +101,7 @@ impl CameraServo {
         axes: Option<Vec<String>>,
         camera_in_hand: Option<&Bound<'_, PyAny>>,
         solver: Option<&str>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let mount = camera_in_hand.map(|m| given::transform("camera_in_hand", m)).transpose()?;
         let mount = mount.map_or(Mount::Camera, Mount::Hand);
         let axes = axes.map_or(Ok(Axes::default()), |names| named_axes(&names))?;
@@ -121,120 +127,20 @@ impl CameraServo {
             axes,
         };
         let rate = positive("rate", rate)?;
-        Loop::new(&given, |unit| Ok(FreeCameraLaw { rate, unit })).map(Self)
-    }
-
-    /// The command for one image.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array_like of shape (N, 2)
-    ///     The same features now, in the order of ``goal``; NaN for those that are not seen.
-    /// stamp : float, optional
-    ///     When the image was taken, in seconds; one period after the last one where not given. An image that is not later
-    ///     than the last one is stale.
-    /// now : float, optional
-    ///     The present on the same clock, to see whether the image is too old.
-    ///
-    /// Returns
-    /// -------
-    /// Command
-    ///     Velocities within the limits; towards zero while the loop holds.
-    #[pyo3(signature = (points, /, stamp=None, now=None))]
-    fn step(&mut self, points: &Bound<'_, PyAny>, stamp: Option<f64>, now: Option<f64>) -> PyResult<Command> {
-        self.0.step(points, stamp, now)
-    }
-
-    /// What to do where no image comes: the linear and the angular velocity, which go to zero once the last image is
-    /// ``largest_gap`` old.
-    ///
-    /// Parameters
-    /// ----------
-    /// now : float
-    ///     The present, on the clock of the stamps.
-    #[pyo3(signature = (now, /))]
-    fn idle<'py>(
-        &mut self,
-        py: Python<'py>,
-        now: f64,
-    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let twist = self.0.servo.idle(now);
-        (twist.linear.as_slice().to_pyarray(py), twist.angular.as_slice().to_pyarray(py))
-    }
-
-    /// Forgets everything but the goal and the depths that were given.
-    fn reset(&mut self) {
-        self.0.servo.reset();
-    }
-
-    /// The depths of the features at the goal as they are known now.
-    ///
-    /// Returns
-    /// -------
-    /// depths, precision : numpy.ndarray of shape (N,)
-    ///     In metres if ``unit`` is exact, and their relative standard deviations; NaN for what is not known. What
-    ///     ``set_depths`` takes.
-    fn depths<'py>(&mut self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let (depths, precision) = self.0.depths();
-        (depths.to_pyarray(py), precision.to_pyarray(py))
-    }
-
-    /// Starts anew with depths that are known: from an earlier run, or another sensor.
-    ///
-    /// Parameters
-    /// ----------
-    /// depths : array_like of shape (N,)
-    ///     In the unit of those given at the start, NaN where one is not known.
-    /// precision : float or array_like of shape (N,)
-    ///     Their relative standard deviations.
-    #[pyo3(signature = (depths, /, precision=None))]
-    fn set_depths(
-        &mut self,
-        depths: &Bound<'_, PyAny>,
-        precision: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        self.0.set_depths(depths, precision)
-    }
-
-    /// float : The unit of ``t`` in metres: as given, or the harmonic mean of the depths.
-    #[getter]
-    fn unit(&mut self) -> f64 {
-        self.0.servo.rig_mut().unit
-    }
-
-    /// float : The largest speed, in m/s. It can be set.
-    #[getter]
-    fn get_max_speed(&mut self) -> f64 {
-        self.0.servo.safety_mut().limits.speed
-    }
-
-    #[setter]
-    fn set_max_speed(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.safety_mut().limits.speed = positive("max_speed", value)?;
-        Ok(())
-    }
-
-    /// float : The largest turn rate, in rad/s. It can be set.
-    #[getter]
-    fn get_max_turn_rate(&mut self) -> f64 {
-        self.0.servo.safety_mut().limits.turn_rate
-    }
-
-    #[setter]
-    fn set_max_turn_rate(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.safety_mut().limits.turn_rate = positive("max_turn_rate", value)?;
-        Ok(())
+        let shared = Loop::shared(&given, |unit| Ok(FreeCameraLaw { rate, unit }))?;
+        Ok(PyClassInitializer::from(Controller::new(Arc::clone(&shared) as _)).add_subclass(Self(shared)))
     }
 
     /// float : How fast both errors decay, in 1/s. It can be set.
     #[getter]
     fn get_rate(&self) -> f64 {
-        self.0.servo.law().rate
+        locked(&self.0).servo.law().rate
     }
 
     #[setter]
-    fn set_rate(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.law_mut().rate = positive("rate", value)?;
+    fn set_rate(&self, value: f64) -> PyResult<()> {
+        let value = positive("rate", value)?;
+        locked(&self.0).servo.law_mut().rate = value;
         Ok(())
     }
 }
@@ -301,9 +207,9 @@ fn named_axes(names: &[String]) -> PyResult<Axes> {
 /// ------
 /// TooFewMatches, ShapeMismatch, NotFinite, BadCamera, QuestError
 ///     As ``CameraServo``.
-#[pyclass(module = "quest_pose.servo")]
+#[pyclass(extends = Controller, frozen, module = "quest_pose.servo")]
 #[derive(Debug)]
-pub(crate) struct RobotServo(Loop<DifferentialDriveLaw>);
+pub(crate) struct RobotServo(Arc<Mutex<Loop<DifferentialDriveLaw>>>);
 
 #[pymethods]
 impl RobotServo {
@@ -335,7 +241,7 @@ impl RobotServo {
         largest_gap: f64,
         camera_in_base: Option<&Bound<'_, PyAny>>,
         solver: Option<&str>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<PyClassInitializer<Self>> {
         let (k1, k2) = (positive("speed_gain", speed_gain)?, positive("turn_gain", turn_gain)?);
         let tilt = positive("tilt", tilt)?;
         let plane = Some(Plane { tilt, height: 0.5 * tilt });
@@ -362,149 +268,59 @@ impl RobotServo {
             mount,
             axes,
         };
-        let law = |unit: f64| {
-            let least = k1 / unit;
-            if k2 > least {
-                return Ok(DifferentialDriveLaw::new(k1, k2));
-            }
-            Err(QuestError::new_err(format!(
-                "turn_gain is {k2}, expected more than speed_gain / unit = {least}: the law would not converge"
-            )))
-        };
-        Loop::new(&given, law).map(Self)
-    }
-
-    /// The command for one image.
-    ///
-    /// Parameters
-    /// ----------
-    /// points : array_like of shape (N, 2)
-    ///     The same features now, in the order of ``goal``; NaN for those that are not seen.
-    /// stamp : float, optional
-    ///     When the image was taken, in seconds; one period after the last one where not given. An image that is not later
-    ///     than the last one is stale.
-    /// now : float, optional
-    ///     The present on the same clock, to see whether the image is too old.
-    ///
-    /// Returns
-    /// -------
-    /// Command
-    ///     Velocities within the limits; towards zero while the loop holds.
-    #[pyo3(signature = (points, /, stamp=None, now=None))]
-    fn step(&mut self, points: &Bound<'_, PyAny>, stamp: Option<f64>, now: Option<f64>) -> PyResult<Command> {
-        self.0.step(points, stamp, now)
-    }
-
-    /// What to do where no image comes: the linear and the angular velocity, which go to zero once the last image is
-    /// ``largest_gap`` old.
-    ///
-    /// Parameters
-    /// ----------
-    /// now : float
-    ///     The present, on the clock of the stamps.
-    #[pyo3(signature = (now, /))]
-    fn idle<'py>(
-        &mut self,
-        py: Python<'py>,
-        now: f64,
-    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let twist = self.0.servo.idle(now);
-        (twist.linear.as_slice().to_pyarray(py), twist.angular.as_slice().to_pyarray(py))
-    }
-
-    /// Forgets everything but the goal and the depths that were given.
-    fn reset(&mut self) {
-        self.0.servo.reset();
-    }
-
-    /// The depths of the features at the goal as they are known now.
-    ///
-    /// Returns
-    /// -------
-    /// depths, precision : numpy.ndarray of shape (N,)
-    ///     In metres if ``unit`` is exact, and their relative standard deviations; NaN for what is not known. What
-    ///     ``set_depths`` takes.
-    fn depths<'py>(&mut self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let (depths, precision) = self.0.depths();
-        (depths.to_pyarray(py), precision.to_pyarray(py))
-    }
-
-    /// Starts anew with depths that are known: from an earlier run, or another sensor.
-    ///
-    /// Parameters
-    /// ----------
-    /// depths : array_like of shape (N,)
-    ///     In the unit of those given at the start, NaN where one is not known.
-    /// precision : float or array_like of shape (N,)
-    ///     Their relative standard deviations.
-    #[pyo3(signature = (depths, /, precision=None))]
-    fn set_depths(
-        &mut self,
-        depths: &Bound<'_, PyAny>,
-        precision: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        self.0.set_depths(depths, precision)
-    }
-
-    /// float : The unit of ``t`` in metres: as given, or the harmonic mean of the depths.
-    #[getter]
-    fn unit(&mut self) -> f64 {
-        self.0.servo.rig_mut().unit
-    }
-
-    /// float : The largest speed, in m/s. It can be set.
-    #[getter]
-    fn get_max_speed(&mut self) -> f64 {
-        self.0.servo.safety_mut().limits.speed
-    }
-
-    #[setter]
-    fn set_max_speed(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.safety_mut().limits.speed = positive("max_speed", value)?;
-        Ok(())
-    }
-
-    /// float : The largest turn rate, in rad/s. It can be set.
-    #[getter]
-    fn get_max_turn_rate(&mut self) -> f64 {
-        self.0.servo.safety_mut().limits.turn_rate
-    }
-
-    #[setter]
-    fn set_max_turn_rate(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.safety_mut().limits.turn_rate = positive("max_turn_rate", value)?;
-        Ok(())
+        let law = |unit: f64| converging(k1, k2, unit).map(|(k1, k2)| DifferentialDriveLaw::new(k1, k2));
+        let shared = Loop::shared(&given, law)?;
+        Ok(PyClassInitializer::from(Controller::new(Arc::clone(&shared) as _)).add_subclass(Self(shared)))
     }
 
     /// float : The gain k1, in m/s. It can be set.
     #[getter]
     fn get_speed_gain(&self) -> f64 {
-        self.0.servo.law().speed_gain
+        locked(&self.0).servo.law().speed_gain
     }
 
     #[setter]
-    fn set_speed_gain(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.law_mut().speed_gain = positive("speed_gain", value)?;
-        Ok(())
+    fn set_speed_gain(&self, value: f64) -> PyResult<()> {
+        self.set_gains(positive("speed_gain", value)?, self.get_turn_gain())
     }
 
     /// float : The gain k2, in rad/s. It can be set.
     #[getter]
     fn get_turn_gain(&self) -> f64 {
-        self.0.servo.law().turn_gain
+        locked(&self.0).servo.law().turn_gain
     }
 
     #[setter]
-    fn set_turn_gain(&mut self, value: f64) -> PyResult<()> {
-        self.0.servo.law_mut().turn_gain = positive("turn_gain", value)?;
-        Ok(())
+    fn set_turn_gain(&self, value: f64) -> PyResult<()> {
+        self.set_gains(self.get_speed_gain(), positive("turn_gain", value)?)
     }
 
     /// bool : Whether the robot has arrived, and only turns to the goal's heading.
     #[getter]
     fn has_arrived(&self) -> bool {
-        self.0.servo.law().has_arrived()
+        locked(&self.0).servo.law().has_arrived()
     }
+}
+
+impl RobotServo {
+    fn set_gains(&self, k1: f64, k2: f64) -> PyResult<()> {
+        let mut shared = locked(&self.0);
+        let gains = converging(k1, k2, shared.servo.rig_mut().unit)?;
+        let law = shared.servo.law_mut();
+        (law.speed_gain, law.turn_gain) = gains;
+        Ok(())
+    }
+}
+
+/// Both gains, with which the law of appendix C converges.
+fn converging(k1: f64, k2: f64, unit: f64) -> PyResult<(f64, f64)> {
+    let least = k1 / unit;
+    if k2 > least {
+        return Ok((k1, k2));
+    }
+    Err(QuestError::new_err(format!(
+        "turn_gain is {k2}, expected more than speed_gain / unit = {least}: the law would not converge"
+    )))
 }
 
 /// Three numbers, or a matrix.

@@ -233,9 +233,101 @@ def test_another_number_of_points_is_refused() -> None:
         loop.step(GOAL[:5])
 
 
+SETTINGS = {
+    "max_speed": 0.1,
+    "max_turn_rate": 0.2,
+    "max_acceleration": 0.7,
+    "max_turn_acceleration": np.inf,
+    "explore": 0.04,
+    "tolerance": 0.002,
+    "angle_tolerance": 0.25,
+    "arrival_time": 2.0,
+    "coasting_images": 3,
+    "largest_gap": 0.2,
+}
+
+
+@pytest.mark.parametrize("kind", [servo.CameraServo, servo.RobotServo])
+def test_settings_are_those_given_and_can_be_set(kind: Any) -> None:
+    made = kind(GOAL, **{**LIMITS, **SETTINGS}, noise=1e-3, unit=2.0, period=0.05)
+    changed = kind(GOAL, **LIMITS, noise=1e-3, unit=2.0, period=0.05)
+    assert isinstance(made, servo.Controller) and made.watchdog
+    assert made.period == 0.05 and made.unit == 2.0
+    # Twice the limits where it is not given.
+    assert changed.max_acceleration == pytest.approx(0.6) and changed.max_turn_acceleration == pytest.approx(0.8)
+    for name, value in SETTINGS.items():
+        assert getattr(made, name) == pytest.approx(value), name
+        setattr(changed, name, value)
+        assert getattr(changed, name) == pytest.approx(value), name
+        if name != "coasting_images":
+            with pytest.raises(qp.QuestError, match=f"{name} is -1"):
+                setattr(changed, name, -1.0)
+    changed.watchdog = False
+    assert not changed.watchdog
+    for _ in range(20):
+        one, other = made.step(GOOD), changed.step(GOOD)
+        np.testing.assert_array_equal(one.linear, other.linear)
+        assert np.linalg.norm(one.linear) <= 0.1
+
+
+def test_gains_can_be_set() -> None:
+    camera = servo.CameraServo(GOAL, **LIMITS, noise=1e-3, depths=FEATURES[:, 2])
+    camera.rate = 2.0
+    assert camera.rate == 2.0
+    robot = servo.RobotServo(GOAL, **LIMITS, noise=1e-3, unit=2.0)
+    robot.turn_gain, robot.speed_gain = 1.5, 0.75
+    assert (robot.speed_gain, robot.turn_gain) == (0.75, 1.5)
+    with pytest.raises(qp.QuestError, match="speed_gain / unit = 2: the law would not converge"):
+        robot.speed_gain = 4.0
+    assert robot.speed_gain == 0.75
+
+
+def test_a_controller_of_no_kind_cannot_be_made() -> None:
+    kind: Any = servo.Controller
+    with pytest.raises(TypeError):
+        kind(GOAL, **LIMITS, noise=1e-3)
+
+
+def test_joints_make_the_twist_within_their_limits() -> None:
+    jacobian = np.sin(1.3 * np.arange(7) + 0.7 * np.arange(6)[:, None] + 0.2 * np.outer(np.arange(6), np.arange(7)))
+    twist = np.array([0.1, -0.05, 0.2, 0.1, 0.2, -0.1])
+    for most in (100.0, 0.01):
+        velocities, factor = servo.joint_velocities(
+            twist[:3], twist[3:], jacobian, max_speeds=np.full(7, most), damping=1e-9
+        )
+        assert (factor < 1) == (most == 0.01) and np.abs(velocities).max() <= most * (1 + 1e-12)
+        np.testing.assert_allclose(jacobian @ velocities, factor * twist, atol=1e-6 * factor)
+    ends = np.where(velocities[:, None] < 0, [0.0, 1.0], [-1.0, 1.0])
+    still, factor = servo.joint_velocities(
+        twist[:3], twist[3:], jacobian, max_speeds=np.ones(7), positions=np.zeros(7), ends=ends
+    )
+    assert factor == 0 and not still.any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"jacobian": np.eye(5)}, qp.ShapeMismatch, "transpose of jacobian has the shape"),
+        ({"jacobian": np.full((6, 6), np.nan)}, qp.NotFinite, "jacobian has the number NaN"),
+        ({"linear": [1.0, 2.0]}, qp.ShapeMismatch, "linear has 2 numbers, expected three"),
+        ({"angular": [np.inf, 0.0, 0.0]}, qp.NotFinite, "angular has the number inf"),
+        ({"max_speeds": np.ones(5)}, qp.ShapeMismatch, "max_speeds has 5 numbers, expected 6"),
+        ({"positions": np.zeros(6)}, qp.ShapeMismatch, "without the other"),
+        ({"positions": np.zeros(6), "ends": np.zeros((5, 2))}, qp.ShapeMismatch, "ends has 5 rows, expected 6"),
+        ({"damping": -1.0}, qp.QuestError, "damping is -1"),
+        ({"seconds": 0.0}, qp.QuestError, "seconds is 0"),
+    ],
+)
+def test_bad_arguments_of_joints(arguments: dict[str, Any], error: type[Exception], words: str) -> None:
+    given: dict[str, Any] = {"linear": np.ones(3), "angular": np.ones(3), "jacobian": np.eye(6), **arguments}
+    named = {name: given.pop(name) for name in ("linear", "angular", "jacobian")}
+    with pytest.raises(error, match=words):
+        servo.joint_velocities(*named.values(), **{"max_speeds": np.ones(6), **given})
+
+
 @pytest.mark.parametrize("name", servo.__all__)
 def test_everything_is_documented(name: str) -> None:
     public = getattr(servo, name)
     assert inspect.getdoc(public)
-    for member in (n for n in vars(public) if not n.startswith("_")):
+    for member in (n for n in getattr(public, "__dict__", {}) if not n.startswith("_")):
         assert inspect.getdoc(getattr(public, member)), member

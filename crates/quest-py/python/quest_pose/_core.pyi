@@ -4,7 +4,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, final, type_che
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import NotRequired
+from typing_extensions import NotRequired, disjoint_base
 
 __all__ = [
     "BadCamera",
@@ -12,6 +12,7 @@ __all__ = [
     "CameraServo",
     "Candidate",
     "Command",
+    "Controller",
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
@@ -39,6 +40,7 @@ __all__ = [
     "constraint_matrix",
     "estimate",
     "estimate_batch",
+    "joint_velocities",
     "solve",
 ]
 
@@ -415,8 +417,31 @@ class Command:
 
 def _command(state: tuple[Any, ...]) -> Command: ...
 
+@disjoint_base
+class Controller:
+    def step(self, points: ArrayLike, /, stamp: float | None = None, now: float | None = None) -> Command: ...
+    def idle(self, now: float, /) -> tuple[_Array, _Array]: ...
+    def reset(self) -> None: ...
+    def depths(self) -> tuple[_Array, _Array]: ...
+    def set_depths(self, depths: ArrayLike, /, precision: ArrayLike | None = None) -> None: ...
+    @property
+    def unit(self) -> float: ...
+    @property
+    def period(self) -> float: ...
+    max_speed: float
+    max_turn_rate: float
+    max_acceleration: float
+    max_turn_acceleration: float
+    explore: float
+    tolerance: float
+    angle_tolerance: float
+    arrival_time: float
+    coasting_images: int
+    largest_gap: float
+    watchdog: bool
+
 @final
-class CameraServo:
+class CameraServo(Controller):
     def __new__(
         cls,
         goal: ArrayLike,
@@ -443,19 +468,10 @@ class CameraServo:
         camera_in_hand: ArrayLike | None = None,
         solver: str | None = None,
     ) -> CameraServo: ...
-    def step(self, points: ArrayLike, /, stamp: float | None = None, now: float | None = None) -> Command: ...
-    def idle(self, now: float, /) -> tuple[_Array, _Array]: ...
-    def reset(self) -> None: ...
-    def depths(self) -> tuple[_Array, _Array]: ...
-    def set_depths(self, depths: ArrayLike, /, precision: ArrayLike | None = None) -> None: ...
-    @property
-    def unit(self) -> float: ...
-    max_speed: float
-    max_turn_rate: float
     rate: float
 
 @final
-class RobotServo:
+class RobotServo(Controller):
     def __new__(
         cls,
         goal: ArrayLike,
@@ -484,19 +500,23 @@ class RobotServo:
         camera_in_base: tuple[float, float, float] | ArrayLike | None = None,
         solver: str | None = None,
     ) -> RobotServo: ...
-    def step(self, points: ArrayLike, /, stamp: float | None = None, now: float | None = None) -> Command: ...
-    def idle(self, now: float, /) -> tuple[_Array, _Array]: ...
-    def reset(self) -> None: ...
-    def depths(self) -> tuple[_Array, _Array]: ...
-    def set_depths(self, depths: ArrayLike, /, precision: ArrayLike | None = None) -> None: ...
-    @property
-    def unit(self) -> float: ...
-    max_speed: float
-    max_turn_rate: float
     speed_gain: float
     turn_gain: float
     @property
     def has_arrived(self) -> bool: ...
+
+def joint_velocities(
+    linear: ArrayLike,
+    angular: ArrayLike,
+    jacobian: ArrayLike,
+    /,
+    *,
+    max_speeds: ArrayLike,
+    damping: float = 0.05,
+    positions: ArrayLike | None = None,
+    ends: ArrayLike | None = None,
+    seconds: float = 0.5,
+) -> tuple[_Array, float]: ...
 def _colmap_verify(
     database: _Path,
     pairs: _Names | None,

@@ -12,9 +12,18 @@ Frame 1 is the goal, frame 2 the camera now. Give the features of the goal image
 ('starting', 0.0, 0.0)
 """
 
-from quest_pose._core import CameraServo, Command, RobotServo
+from quest_pose._core import CameraServo, Command, Controller, RobotServo, joint_velocities
 from quest_pose._servo_goal import GoalImage
 from quest_pose._servo_loop import Servo
 from quest_pose._servo_recorder import Recorder
 
-__all__ = ["CameraServo", "Command", "GoalImage", "Recorder", "RobotServo", "Servo"]
+__all__ = [
+    "CameraServo",
+    "Command",
+    "Controller",
+    "GoalImage",
+    "Recorder",
+    "RobotServo",
+    "Servo",
+    "joint_velocities",
+]

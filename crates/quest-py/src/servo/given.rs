@@ -1,15 +1,19 @@
 //! What both controllers are told, and what they are made of.
 
+use std::fmt::Debug;
+use std::sync::{Arc, Mutex};
+
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use pyo3::prelude::*;
 use quest_core::RelativePose;
 use quest_core::servo::{
     Acceleration, Arrival, Axes, Border, ControlLaw, FilterOptions, Limits, Mount, Plane, PoseEstimator, Rig,
-    Safety, Servo, Tracker, on_plane,
+    Safety, Servo, Tracker, Twist, on_plane,
 };
 use quest_core::solver::SolverName;
 
 use super::command::Command;
+use super::controller::AnyLoop;
 use crate::errors::{NotFinite, QuestError, ShapeMismatch, TooFewMatches};
 use crate::{arrays, camera};
 
@@ -46,7 +50,7 @@ pub(super) fn positive(name: &str, value: f64) -> PyResult<f64> {
 }
 
 /// A number of the argument `name` that is not negative; infinity counts.
-fn not_negative(name: &str, value: f64) -> PyResult<f64> {
+pub(super) fn not_negative(name: &str, value: f64) -> PyResult<f64> {
     if value >= 0.0 {
         return Ok(value);
     }
@@ -54,7 +58,7 @@ fn not_negative(name: &str, value: f64) -> PyResult<f64> {
 }
 
 /// The inverse depths' harmonic mean: the unit of `t` where the depths are in metres.
-pub(super) fn unit_of(depths: &[f64]) -> Option<f64> {
+fn unit_of(depths: &[f64]) -> Option<f64> {
     let (sum, count) = depths
         .iter()
         .filter(|z| z.is_finite())
@@ -113,8 +117,7 @@ pub(super) fn transform(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Relati
 /// What both controllers are made of.
 #[derive(Debug)]
 pub(super) struct Loop<L> {
-    pub(super) camera: Option<quest_core::Camera>,
-    pub(super) features: usize,
+    camera: Option<quest_core::Camera>,
     pub(super) servo: Servo<Tracker<SolverName>, L>,
     /// The last image on the plane z = 1.
     seen: Vec<Option<[f64; 2]>>,
@@ -122,7 +125,10 @@ pub(super) struct Loop<L> {
 
 impl<L: ControlLaw> Loop<L> {
     /// The loop with the law that is made of the unit in metres.
-    pub(super) fn new(given: &Given<'_, '_>, law: impl Fn(f64) -> PyResult<L>) -> PyResult<Self> {
+    pub(super) fn shared(
+        given: &Given<'_, '_>,
+        law: impl Fn(f64) -> PyResult<L>,
+    ) -> PyResult<Arc<Mutex<Self>>> {
         let camera = given.camera.map(|c| camera::from_argument("camera", c)).transpose()?;
         let solver = given.solver.map_or(Ok(SolverName::default()), str::parse);
         let solver = solver.map_err(|error| QuestError::new_err(error.to_string()))?;
@@ -147,50 +153,52 @@ impl<L: ControlLaw> Loop<L> {
         }
         let rig = Rig { period, unit, mount: given.mount, axes: given.axes };
         let servo = Servo::new(&goal, tracker, law(unit)?, safety).with_rig(rig);
-        Ok(Self { camera, features: goal.len(), servo, seen: vec![None; goal.len()] })
+        Ok(Arc::new(Mutex::new(Self { camera, servo, seen: vec![None; goal.len()] })))
+    }
+}
+
+impl<L: ControlLaw + Debug + Send> AnyLoop for Loop<L> {
+    fn features(&self) -> usize {
+        self.seen.len()
     }
 
-    /// The depths in metres with their relative precision; NaN where nothing is known.
-    pub(super) fn depths(&mut self) -> (Vec<f64>, Vec<f64>) {
-        let unit = self.servo.rig_mut().unit;
-        let all =
-            |numbers: Vec<f64>| if numbers.is_empty() { vec![f64::NAN; self.features] } else { numbers };
-        let filter = self.servo.estimator();
-        (all(filter.depths().map(|z| unit * z).collect()), all(filter.depth_precisions().collect()))
-    }
-
-    pub(super) fn set_depths(
-        &mut self,
-        given: &Bound<'_, PyAny>,
-        precision: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let (z, precision) = depths(given, precision, self.features)?;
-        self.servo.reset();
-        self.servo.estimator_mut().set_depths_each(&z, &precision);
-        Ok(())
-    }
-
-    pub(super) fn step(
-        &mut self,
-        points: &Bound<'_, PyAny>,
-        stamp: Option<f64>,
-        now: Option<f64>,
-    ) -> PyResult<Command> {
-        let points: Vec<[f64; 2]> = arrays::rows("points", points)?;
-        if points.len() != self.features {
-            let (found, expected) = (points.len(), self.features);
-            return Err(ShapeMismatch::new_err(format!(
-                "points has {found} rows, expected {expected} as goal, NaN for features that are not seen"
-            )));
-        }
+    fn step(&mut self, points: &[[f64; 2]], stamp: Option<f64>, now: Option<f64>) -> Command {
         for (seen, point) in self.seen.iter_mut().zip(points) {
-            *seen = point_on_plane(self.camera.as_ref(), point);
+            *seen = point_on_plane(self.camera.as_ref(), *point);
         }
         let step = match stamp {
             Some(stamp) => self.servo.step_at(&self.seen, stamp, now.unwrap_or(stamp)),
             None => self.servo.step(&self.seen),
         };
-        Ok(Command::new(&step, self.servo.estimator().inliers(), self.features))
+        Command::new(&step, self.servo.estimator().inliers(), self.seen.len())
+    }
+
+    fn idle(&mut self, now: f64) -> Twist {
+        self.servo.idle(now)
+    }
+
+    fn reset(&mut self) {
+        self.servo.reset();
+    }
+
+    fn depths(&mut self) -> (Vec<f64>, Vec<f64>) {
+        let (unit, features) = (self.servo.rig_mut().unit, self.seen.len());
+        let all = |numbers: Vec<f64>| if numbers.is_empty() { vec![f64::NAN; features] } else { numbers };
+        let filter = self.servo.estimator();
+        (all(filter.depths().map(|z| unit * z).collect()), all(filter.depth_precisions().collect()))
+    }
+
+    fn set_depths(&mut self, depths: &[f64], precision: &[f64]) {
+        self.servo.reset();
+        self.servo.estimator_mut().set_depths_each(depths, precision);
+    }
+
+    fn safety(&mut self) -> &mut Safety {
+        self.servo.safety_mut()
+    }
+
+    fn rig(&mut self) -> &mut Rig {
+        self.servo.rig_mut()
     }
 }
 
