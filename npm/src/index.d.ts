@@ -1,0 +1,2 @@
+export * from "./quest_pose.js";
+export { default } from "./quest_pose.js";
