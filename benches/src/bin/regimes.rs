@@ -38,6 +38,9 @@ struct Arguments {
     /// Parallaxes of the first table, in pixels
     #[arg(long, value_delimiter = ',', default_value = "0,0.5,1,2,3,4,6,10")]
     parallax: Vec<f64>,
+    /// Only the rows of the first table whose name has this
+    #[arg(long, default_value = "")]
+    rows: String,
     /// Threads; the numbers do not depend on it
     #[arg(long, default_value_t = parallel::all_cores())]
     threads: usize,
@@ -195,6 +198,7 @@ impl Arguments {
             (9.0 - 5.0 * side) * rng.random_range(0.9..1.1)
         };
         for (count, inliers, threshold) in [
+            (100, 0.7, 1.5),
             (500, 0.5, 1.25),
             (500, 0.5, 2.5),
             (500, 1.0, 1.25),
@@ -217,16 +221,26 @@ impl Arguments {
             );
         }
         self.row_of_parallax(
-            "corridor, 500, 70 %, 1.25",
+            "corridor, 500, 70 %",
             |planted| {
                 planted.add_true(350, corridor);
                 planted.add_false(150);
             },
             1.25,
         );
+        self.row_of_parallax(
+            "corridor, 350, 100 %",
+            |planted| {
+                planted.add_true(350, corridor);
+            },
+            1.25,
+        );
     }
 
     fn row_of_parallax(&self, name: &str, fill: impl Fn(&mut Planted) + Sync, threshold: f64) {
+        if !name.contains(&self.rows) {
+            return;
+        }
         for &parallax in &self.parallax {
             let all = self.map(|index| {
                 let mut planted = Planted::new(self.seed, index, parallax * 6.5 / FOCAL_LENGTH);

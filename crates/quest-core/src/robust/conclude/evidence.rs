@@ -52,6 +52,8 @@ pub(crate) struct Evidence {
     pub(crate) nats: f64,
     /// The probability of each match that it is true.
     pub(crate) is_true: Vec<f64>,
+    /// The mean inverse depth in units of the motion's translation.
+    pub(crate) mean_depth: f64,
 }
 
 /// The likelihood of some of the matches, given the best rotation without translation.
@@ -66,6 +68,19 @@ pub(crate) struct Likelihood {
     floor: f64,
     /// The normalisation of `q`.
     near_norm: f64,
+}
+
+/// The explanations of a match: their probabilities, and the sums of these over the variances across and along its epipolar line.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Explained {
+    pub(crate) usual: f64,
+    pub(crate) near: f64,
+    pub(crate) across: f64,
+    pub(crate) along: f64,
+    /// The part of near points in `across`.
+    pub(crate) near_across: f64,
+    /// The logarithm of its likelihood over that without a translation.
+    pub(crate) nats: f64,
 }
 
 /// A match under one motion.
@@ -109,7 +124,7 @@ impl Likelihood {
     ) -> Self {
         let framed = observations.framed(indices);
         let outliers = (1.0 - share).clamp(0.01, 0.99);
-        let area = observations.area_of_view2().max(1.0);
+        let area = observations.area_of_view2().max((NEAREST * sigma).powi(2)).max(f64::MIN_POSITIVE);
         let span = (area.sqrt() / (NEAREST * sigma)).max(3.0).ln();
         let mut all = Self {
             framed,
@@ -133,14 +148,62 @@ impl Likelihood {
         (1.0 - self.outliers) * TAILS.into_iter().map(of_tail).sum::<f64>() + self.floor
     }
 
-    /// The evidence for points that are where they are expected to be, by the squared distances of some matches without a
-    /// translation and with one.
-    pub(crate) fn of_squares(&self, both: impl Iterator<Item = [f64; 2]>) -> f64 {
-        without_two(both.map(|[still, moved]| (self.density(moved) / self.density(still)).ln()).collect())
+    /// The variance of the noise.
+    pub(crate) fn variance(&self) -> f64 {
+        (self.sigma * self.sigma).max(f64::MIN_POSITIVE)
+    }
+
+    /// How far each explanation of a match is likely, which is so far across its epipolar line and from its expected place along
+    /// it; `along` is how far it has moved there, `spread` the variance that depths add, `near_share` the share of near points.
+    pub(crate) fn explain(
+        &self,
+        index: usize,
+        [across, away]: [f64; 2],
+        along: f64,
+        spread: f64,
+        near_share: f64,
+        is_in_front: bool,
+    ) -> Explained {
+        let mut found =
+            Explained { usual: 0.0, near: 0.0, across: 0.0, along: 0.0, near_across: 0.0, nats: 0.0 };
+        let mut near = 0.0;
+        if is_in_front {
+            for [share, width] in TAILS {
+                let variance = (width * self.sigma).powi(2);
+                let side = share * normal(across * across, variance);
+                let all = (1.0 - near_share) * side * normal(away * away, variance + spread);
+                found.usual += all;
+                found.across += all / variance;
+                found.along += all / (variance + spread);
+                near += side;
+            }
+            let is_near = along > 0.0;
+            near *= if is_near { near_share * self.near_norm / along.max(NEAREST * self.sigma) } else { 0.0 };
+        }
+        let share = 1.0 - self.outliers;
+        let sum = share * (found.usual + near) + self.floor;
+        found.nats = (sum / self.still[index]).ln();
+        if near > found.usual && share * near < BELIEVED * sum {
+            near = 0.0;
+        }
+        found.near_across = near / self.variance();
+        found.across += found.near_across;
+        let scale = share / sum;
+        found.usual *= scale;
+        found.near = near * scale;
+        found.across *= scale;
+        found.near_across *= scale;
+        found.along *= scale;
+        found
+    }
+
+    /// The sum of what the matches say, less what the free direction of the translation explains of any two.
+    pub(crate) fn without_free(nats: Vec<f64>) -> f64 {
+        without_two(nats)
     }
 
     /// The displacements of the matches from where a rotation takes them.
-    pub(crate) fn displacements(&self, q_21: &UnitQuaternion<f64>) -> Vec<Displacement> {
+    fn displacements(&self, q_21: &UnitQuaternion<f64>) -> Vec<Displacement> {
         self.framed.displacements(&q_21.to_rotation_matrix().into_inner())
     }
 
@@ -160,7 +223,7 @@ impl Likelihood {
             is_true.push(if is_doubtful { 0.0 } else { 1.0 - self.floor / p1 });
             nats.push((p1 / p0).ln());
         }
-        Evidence { nats: without_two(nats), is_true }
+        Evidence { nats: without_two(nats), is_true, mean_depth: depths.mean }
     }
 
     fn split(&self, d: &Displacement, motion: &Motion) -> Split {

@@ -4,7 +4,7 @@
 mod alternatives;
 mod chance_inliers;
 mod covariance;
-mod equal_depths;
+mod depth_field;
 mod evidence;
 pub(crate) mod false_alarms;
 mod final_refinement;

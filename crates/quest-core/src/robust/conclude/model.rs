@@ -36,6 +36,9 @@ const EVIDENT: f64 = 12.0;
 /// A plane has to explain all but this share of what a rotation leaves: where that is little, any plane leaves little.
 const UNEXPLAINED: f64 = 0.1;
 
+/// Points whose inverse depths differ by more than this share of their mean from those of a plane are no plane.
+const FLAT: f64 = 0.1;
+
 /// A plane is enough below this, and a little above it where there are few matches.
 const PLANE: f64 = 1.7;
 const PLANE_OF_FEW: f64 = 20.0;
@@ -90,9 +93,10 @@ pub(crate) fn choose(
         None => observations.len() < MANY && excess(&rotation, &general, sigma) < ROTATION,
     };
     let is_plane = match small {
-        Some(SmallMotion { excess, sigma, .. }) => {
+        Some(SmallMotion { excess, sigma, modes, .. }) => {
             let explains = || of_plane(*sigma) - 1.0 < UNEXPLAINED * (excess - 1.0);
-            is_plane(*sigma) && (*excess > NOT_A_ROTATION || explains())
+            let is_flat = modes.first().is_none_or(|mode| mode.at.off_plane() < FLAT);
+            is_plane(*sigma) && is_flat && (*excess > NOT_A_ROTATION || explains())
         }
         None => is_plane(sigma),
     };

@@ -9,7 +9,7 @@ use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plan
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
-use crate::robust::conclude::mixture::mixture;
+use crate::robust::conclude::mixture::{held, mixture};
 use crate::robust::conclude::model::Verdict;
 use crate::robust::conclude::plane::Plane;
 use crate::robust::conclude::small_motion::SmallMotion;
@@ -85,12 +85,16 @@ pub(crate) fn report(
         let general = covariance::of_pose(observations, &polished, size, false_matches);
         let general = general.map(|covariance| (pose, covariance));
         mixture(observations, small, sigma, general.as_ref())
+            .map(|all| if model == Model::PureRotation { held(&small.q_21, all) } else { all })
             .filter(|(_, covariance)| covariance::says_something(covariance))?
     } else if model == Model::PureRotation {
         (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
     } else {
         (pose, covariance::of_pose(observations, &polished, size, false_matches)?)
     };
+    if let (Some(small), Model::General) = (&small, model) {
+        second = small.other_mode(&pose.t_21).or(second);
+    }
     let mut mask = vec![false; observations.given];
     for &i in inliers {
         mask[observations.order[i as usize]] = true;

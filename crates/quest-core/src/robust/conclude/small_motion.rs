@@ -5,7 +5,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::robust::conclude::evidence::{Likelihood, ROUNDS};
+use crate::robust::conclude::depth_field::{DepthField, Fit, Matches};
+use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
 use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, rotation_alone};
 use crate::robust::data::observations::Observations;
@@ -26,7 +27,7 @@ const ENOUGH: usize = 2_000;
 
 /// Matches whose likelihood decides, and those that minima are compared and refined over.
 const WEIGHED: usize = 3_000;
-const COMPARED: usize = 1_000;
+const COMPARED: usize = 400;
 
 /// Directions of the translation to begin with, steps of the refinement, and rounds of EM when minima are compared.
 const DIRECTIONS: usize = 12;
@@ -55,6 +56,35 @@ const LIKELY: f64 = 0.5;
 /// At most one in so many inliers is there by chance; more is a sign that the likelihood is wrong.
 const MOST_BY_CHANCE: usize = 5;
 
+/// Minima that the depth fields begin from, matches and rounds to compare those over, and rounds for the modes that are left.
+const STARTS: usize = 5;
+const EXPLORED: usize = 250;
+const EXPLORING_ROUNDS: usize = 8;
+const FIELD_ROUNDS: usize = 8;
+
+/// Modes that are kept, and by how many nats they are less likely than the likeliest at most.
+const MODES: usize = 4;
+const UNLIKELY: f64 = 8.0;
+
+/// A mode is nearly as likely with so many nats less, and another one where its direction is so many radians away.
+const AS_LIKELY: f64 = 3.0;
+const OTHER: f64 = 0.35;
+
+/// Directions with a larger cosine are one.
+const SAME_DIRECTION: f64 = 0.98;
+
+/// The spread of inverse depths to begin with: of points in space, and of points that are about equally far.
+const USUAL: f64 = 0.2;
+const EVEN: f64 = 0.05;
+
+/// A local minimum of the Sampson errors: its likelihood and the mean inverse depth of its points.
+#[derive(Clone, Copy, Debug)]
+struct Minimum {
+    nats: f64,
+    motion: Motion,
+    mean_depth: f64,
+}
+
 /// What is known of a motion that is small.
 #[derive(Debug)]
 pub(crate) struct SmallMotion {
@@ -68,7 +98,21 @@ pub(crate) struct SmallMotion {
     pub(crate) sigma: f64,
     /// Matches that may be true.
     pub(crate) is_likely: Vec<bool>,
-    pub(crate) likelihood: Likelihood,
+    /// The poses that explain the matches, the likeliest first.
+    pub(crate) modes: Vec<Fit>,
+}
+
+impl SmallMotion {
+    /// Of the modes that are nearly as likely as the likeliest, the one whose direction is the farthest from a translation, if that
+    /// is far.
+    pub(crate) fn other_mode(&self, t_21: &Vector3<f64>) -> Option<Motion> {
+        let most = self.modes.first()?.nats;
+        let likely = self.modes.iter().filter(|mode| mode.nats > most - AS_LIKELY);
+        let away = likely.map(|mode| (mode.at.t_21.angle(t_21), mode));
+        let (angle, mode) = away.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let direction = mode.at.t_21.try_normalize(f64::MIN_POSITIVE)?;
+        (angle > OTHER).then_some(Motion { q_21: mode.at.q_21, direction })
+    }
 }
 
 /// Looks at a pose whose motion is small: the pose of the likeliest minimum, refined without matches that agree by chance.
@@ -94,14 +138,66 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
         let all: Vec<u32> = (0_u32..).take(observations.len().min(count)).collect();
         Likelihood::new(observations, &all, &q_21, sigma, share)
     };
-    let mut polished = polished;
+    let (mut polished, mut minima) = (polished, Vec::new());
     if excess < NOT_A_ROTATION && inliers >= LEAST_INLIERS {
-        polished = likeliest(poses, polished, &q_21, sigma, &likelihood(COMPARED));
+        (polished, minima) = likeliest(poses, polished, &q_21, sigma, &likelihood(COMPARED));
     }
     let (polished, is_likely) = without_chance(poses, polished, &likelihood(usize::MAX));
-    let likelihood = likelihood(WEIGHED);
-    let nats = likelihood.of(polished.motion(), ROUNDS).nats;
-    (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, likelihood }))
+    let Evidence { nats, mean_depth, .. } = likelihood(WEIGHED).of(polished.motion(), ROUNDS);
+    minima.push(Minimum { nats: f64::INFINITY, motion: *polished.motion(), mean_depth });
+    let modes = modes(observations, &q_21, &minima, &likelihood);
+    let nats = modes.first().map_or(nats, |mode| mode.nats.max(nats));
+    (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, modes }))
+}
+
+/// The poses that explain the matches with points at depths that follow a smooth field, from each of the minima and from no
+/// translation at all: those that are nearly as likely as the likeliest.
+fn modes(
+    observations: &Observations,
+    q_21: &UnitQuaternion<f64>,
+    minima: &[Minimum],
+    likelihood: &impl Fn(usize) -> Likelihood,
+) -> Vec<Fit> {
+    let fitted = |starts: Vec<DepthField>, count: usize, rounds: usize| {
+        let indices: Vec<u32> = (0_u32..).take(observations.len().min(count)).collect();
+        let matches = Matches::new(observations.framed(&indices), q_21);
+        let likelihood = likelihood(count);
+        let mut fits: Vec<Fit> =
+            starts.into_iter().filter_map(|start| start.fit(&matches, &likelihood, rounds)).collect();
+        fits.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+        let mut distinct: Vec<Fit> = Vec::new();
+        for fit in fits {
+            let is_known = distinct.iter().any(|other| fit.at.is_near(other));
+            let is_likely = distinct.first().is_none_or(|best| fit.nats > best.nats - UNLIKELY);
+            if is_likely && !is_known && distinct.len() < MODES {
+                distinct.push(fit);
+            }
+        }
+        distinct
+    };
+    let mut starts = vec![DepthField::start(*q_21, Vector3::zeros(), EVEN)];
+    starts.extend(distinct(minima).iter().map(|minimum| {
+        let t_21 = minimum.motion.direction * minimum.mean_depth;
+        DepthField::start(minimum.motion.q_21, t_21, USUAL)
+    }));
+    let explored = fitted(starts, EXPLORED, EXPLORING_ROUNDS);
+    fitted(explored.into_iter().map(|fit| fit.at).collect(), WEIGHED, FIELD_ROUNDS)
+}
+
+/// The likeliest minima whose directions differ.
+fn distinct(minima: &[Minimum]) -> Vec<&Minimum> {
+    let mut sorted: Vec<&Minimum> = minima.iter().collect();
+    sorted.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+    let mut distinct: Vec<&Minimum> = Vec::new();
+    for minimum in sorted {
+        let is_known = distinct
+            .iter()
+            .any(|other| other.motion.direction.dot(&minimum.motion.direction) > SAME_DIRECTION);
+        if !is_known && distinct.len() < STARTS {
+            distinct.push(minimum);
+        }
+    }
+    distinct
 }
 
 /// The best rotation for some of the inliers, and what it leaves.
@@ -128,12 +224,19 @@ fn likeliest(
     q_21: &UnitQuaternion<f64>,
     sigma: f64,
     likelihood: &Likelihood,
-) -> Polished {
+) -> (Polished, Vec<Minimum>) {
     let observations = poses.observations;
-    let of_both_signs = |motion: Motion| {
-        let signs = [1.0, -1.0].map(|sign| Motion { direction: motion.direction * sign, ..motion });
-        let [plus, minus] = signs.map(|motion| likelihood.of(&motion, FEW_ROUNDS).nats);
-        if plus >= minus { (plus, signs[0]) } else { (minus, signs[1]) }
+    let mut minima = Vec::new();
+    let weighed = |motion: Motion| {
+        let Evidence { nats, mean_depth, .. } = likelihood.of(&motion, FEW_ROUNDS);
+        Minimum { nats, motion, mean_depth }
+    };
+    let mut of_both_signs = |motion: Motion| {
+        let [plus, minus] =
+            [1.0, -1.0].map(|sign| weighed(Motion { direction: motion.direction * sign, ..motion }));
+        let better = if plus.nats >= minus.nats { plus } else { minus };
+        minima.extend([plus, minus]);
+        (better.nats, better.motion)
     };
     let refined = |poses: &mut PoseScorer, mut motion: Motion, some: &[u32]| {
         let count = some.len().min(COMPARED);
@@ -164,16 +267,16 @@ fn likeliest(
     }
     let (nats, motion) = best;
     if nats < current + BETTER {
-        return polished;
+        return (polished, minima);
     }
     let wide = poses.score(motion, polished.limit);
     let motion = if wide.inliers.len() >= FEWEST { refined(poses, motion, &wide.inliers) } else { motion };
     poses.recycle(wide);
     let pose = poses.score(motion, poses.threshold());
     if pose.inliers.len() * 10 < polished.pose.inliers.len() * 9 {
-        return polished;
+        return (polished, minima);
     }
-    polished.with_pose(pose, poses.threshold())
+    (polished.with_pose(pose, poses.threshold()), minima)
 }
 
 /// The directions of half a sphere, evenly: on a spiral with the golden angle.

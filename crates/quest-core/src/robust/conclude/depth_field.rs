@@ -1,0 +1,283 @@
+//! The pose of a camera that hardly moves, by the likelihood of all matches with the depths of the points integrated out.
+//!
+//! An essential matrix gives every point a depth of its own. Where the parallax is about the noise, what that finds is far from
+//! linear in the noise, and its first-order covariance is too small (J. Neyman, E. L. Scott, *Consistent estimates based on
+//! partially consistent observations*, Econometrica 1948). Here the inverse depths are a smooth function of the image and a
+//! spread around that:
+//!
+//! ```text
+//! ρ = 1 + Σj cj φj(x) + s ξ,   cj ~ N(0, gj²),   ξ ~ N(0, 1)
+//! ```
+//!
+//! The unit of length is the mean inverse depth, `φj` are polynomials up to the fourth degree and `s` is estimated. The displacement
+//! of a match then has the mean `−ρ̄ b` and the variance `k² σ² I + s² b bᵀ`, with `b` the displacement by a unit of inverse depth
+//! and `k` one of the widths of the noise ([`evidence`](crate::robust::conclude::evidence) has the densities of near points and
+//! of false matches beside it). The model is regular where there is no translation. Where the parallax is well above the noise
+//! `s |b|` is as well, what lies along the epipolar line counts for nothing, and what is left are the equations of an essential
+//! matrix.
+//!
+//! Each round holds the variances, takes the expected share of each explanation of each match, and makes a Gauss–Newton step of
+//! the rotation, the translation and the field together.
+
+use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6};
+
+use crate::robust::conclude::evidence::{Explained, Likelihood};
+use crate::robust::data::point_transfer::{Displacement, Framed};
+
+/// Polynomials of two variables up to the fourth degree, but for the constant.
+const TERMS: usize = 14;
+const DEGREE: usize = 4;
+const PARAMETERS: usize = 6 + TERMS;
+
+/// The deviation of a coefficient of the first degree; its square halves with each further degree. A corridor that is twice as near
+/// at its sides as in the middle has 0.3.
+const RELIEF: f64 = 0.3;
+
+/// Points this many deviations from the middle of the points have the field of those that are there: polynomials grow beyond.
+const FARTHEST: f64 = 1.8;
+
+/// The least spread of the inverse depths, squared.
+const LEAST_SPREAD: f64 = 1e-8;
+
+/// Displacements by a unit of inverse depth below this, in pixels, have no direction.
+const LEAST_LENGTH: f64 = 1e-9;
+
+/// The share of near points to begin with, the least and the most.
+const NEAR: f64 = 0.02;
+const LEAST_NEAR: f64 = 1e-6;
+const MOST_NEAR: f64 = 0.9;
+
+/// So many near points are there by chance: the direction of the translation is free to fit two false matches, and of thirty false
+/// ones some third agrees with some two.
+const FREE: f64 = 3.0;
+
+/// Normal equations have at least this share of their diagonal added: without a translation the field moves no point.
+const RIDGE: f64 = 1e-9;
+
+type Field = SVector<f64, TERMS>;
+type Parameters = SVector<f64, PARAMETERS>;
+type Equations = SMatrix<f64, PARAMETERS, PARAMETERS>;
+
+/// Where a fit begins and what it finds.
+#[derive(Clone, Debug)]
+pub(crate) struct DepthField {
+    pub(crate) q_21: UnitQuaternion<f64>,
+    /// In units of the inverse of the mean inverse depth.
+    pub(crate) t_21: Vector3<f64>,
+    field: Field,
+    /// `s²`.
+    square_spread: f64,
+    near: f64,
+}
+
+/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`.
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    pub(crate) at: DepthField,
+    pub(crate) nats: f64,
+    pub(crate) covariance: Matrix6<f64>,
+}
+
+/// Matches and the polynomials at their points.
+pub(crate) struct Matches {
+    framed: Framed,
+    terms: Vec<Field>,
+}
+
+/// What a round sums up.
+struct Sums {
+    equations: Equations,
+    gradient: Parameters,
+    usual: f64,
+    near: f64,
+    square_spread: f64,
+    nats: Vec<f64>,
+}
+
+impl Matches {
+    pub(crate) fn new(framed: Framed, still: &UnitQuaternion<f64>) -> Self {
+        let at: Vec<Vector2<f64>> =
+            framed.displacements(&still.to_rotation_matrix().into_inner()).iter().map(place).collect();
+        let count = at.len().max(1) as f64;
+        let mean = at.iter().sum::<Vector2<f64>>() / count;
+        let square = at.iter().map(|p| (p - mean).component_mul(&(p - mean))).sum::<Vector2<f64>>() / count;
+        let scale = square.map(|square| 1.0 / square.sqrt().max(1e-9));
+        Self { framed, terms: at.iter().map(|p| polynomials((p - mean).component_mul(&scale))).collect() }
+    }
+}
+
+/// Where the point is seen in view 1, in the plane.
+fn place(d: &Displacement) -> Vector2<f64> {
+    let depth = if d.x1.z.abs() > 1e-3 { d.x1.z } else { 1e-3 };
+    d.x1.xy() / depth
+}
+
+/// The degree of each term.
+fn degrees() -> impl Iterator<Item = [usize; 2]> {
+    (0..=DEGREE).flat_map(|i| (0..=DEGREE - i).map(move |j| [i, j])).filter(|[i, j]| i + j > 0)
+}
+
+/// Products of Hermite polynomials of mean zero and unit variance.
+fn polynomials(at: Vector2<f64>) -> Field {
+    let powers = at.map(|x| x.clamp(-FARTHEST, FARTHEST));
+    let hermite = [powers.x, powers.y].map(|x| {
+        let square = x * x;
+        [
+            1.0,
+            x,
+            (square - 1.0) / 2_f64.sqrt(),
+            (square - 3.0) * x / 6_f64.sqrt(),
+            ((square - 6.0) * square + 3.0) / 24_f64.sqrt(),
+        ]
+    });
+    Field::from_iterator(degrees().map(|[i, j]| hermite[0][i] * hermite[1][j]))
+}
+
+/// `1/gj²`.
+fn precisions() -> Field {
+    let of_degree = |[i, j]: [usize; 2]| {
+        let halvings = i32::try_from(i + j).map_or(0, |degree| degree - 1);
+        2_f64.powi(halvings) / (RELIEF * RELIEF)
+    };
+    Field::from_iterator(degrees().map(of_degree))
+}
+
+impl DepthField {
+    /// A pose whose translation is in units of the mean depth, of points whose inverse depths spread by a share of their mean.
+    pub(crate) fn start(q_21: UnitQuaternion<f64>, t_21: Vector3<f64>, spread: f64) -> Self {
+        Self { q_21, t_21, field: Field::zeros(), square_spread: spread * spread, near: NEAR }
+    }
+
+    /// The mean depth times the mean inverse depth, `1 +` the squared relative deviation: by how much a translation is longer in
+    /// units of the mean inverse depth than in those of the mean depth. The depths of near points count for nothing.
+    pub(crate) fn unit(&self) -> f64 {
+        (1.0 - self.near) * (1.0 + self.square_spread + self.field.norm_squared())
+    }
+
+    /// By what share of their mean inverse depths differ from those of a plane, which are linear in the image.
+    pub(crate) fn off_plane(&self) -> f64 {
+        let linear = degrees().zip(&self.field).filter(|([i, j], _)| i + j == 1).map(|(_, c)| c * c);
+        (self.square_spread + self.field.norm_squared() - linear.sum::<f64>()).max(0.0).sqrt()
+    }
+
+    /// Whether two are the same as far as the covariance of one tells.
+    pub(crate) fn is_near(&self, other: &Fit) -> bool {
+        const NEAR: f64 = 0.5;
+        let turn = (self.q_21 * other.at.q_21.inverse()).scaled_axis();
+        let by = self.t_21 - other.at.t_21;
+        let apart = |x: f64, k: usize| x * x / other.covariance[(k, k)];
+        let sum: f64 = (0..3).map(|k| apart(turn[k], k) + apart(by[k], k + 3)).sum();
+        sum < NEAR * NEAR
+    }
+
+    /// So many rounds, and the likelihood of what they lead to. `None` where the matches do not determine the rotation.
+    pub(crate) fn fit(mut self, matches: &Matches, likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
+        let precisions = precisions();
+        for _ in 0..rounds {
+            let sums = self.round(matches, likelihood);
+            let inverse = regularised(&sums, &precisions)?;
+            let mut gradient = sums.gradient;
+            for (k, precision) in precisions.iter().enumerate() {
+                gradient[6 + k] += precision * self.field[k];
+            }
+            let step = -inverse.solve(&gradient);
+            if !step.iter().all(|x| x.is_finite()) {
+                return None;
+            }
+            self.q_21 = UnitQuaternion::new(step.fixed_rows::<3>(0).into_owned()) * self.q_21;
+            self.t_21 += step.fixed_rows::<3>(3);
+            self.field += step.fixed_rows::<TERMS>(6);
+            if sums.usual > 0.0 {
+                self.square_spread = (sums.square_spread / sums.usual).max(LEAST_SPREAD);
+                let near = (sums.near - FREE).max(0.0);
+                self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
+            }
+        }
+        let sums = self.round(matches, likelihood);
+        let covariance = regularised(&sums, &precisions)?.inverse();
+        let prior: f64 = (0..TERMS).map(|k| precisions[k] * self.field[k] * self.field[k]).sum();
+        let nats = Likelihood::without_free(sums.nats) - 0.5 * prior;
+        let covariance: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
+        let is_finite = nats.is_finite() && covariance.iter().all(|x| x.is_finite());
+        is_finite.then_some(Fit { at: self, nats, covariance })
+    }
+
+    fn round(&self, matches: &Matches, likelihood: &Likelihood) -> Sums {
+        let mut sums = Sums {
+            equations: Equations::zeros(),
+            gradient: Parameters::zeros(),
+            usual: 0.0,
+            near: 0.0,
+            square_spread: 0.0,
+            nats: Vec::with_capacity(matches.terms.len()),
+        };
+        let all = matches.framed.displacements(&self.q_21.to_rotation_matrix().into_inner());
+        for (index, (d, terms)) in all.iter().zip(&matches.terms).enumerate() {
+            self.add(&mut sums, d, terms, likelihood, index);
+        }
+        sums
+    }
+
+    /// Adds what a match says.
+    fn add(&self, sums: &mut Sums, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) {
+        let b = [0, 1].map(|k| d.slope[k].dot(&self.t_21));
+        let length = b[0].hypot(b[1]).max(LEAST_LENGTH);
+        // Without a translation any two directions do.
+        let u = if length > LEAST_LENGTH { b.map(|x| x / length) } else { [1.0, 0.0] };
+        let mean = 1.0 + terms.dot(&self.field);
+        let across = d.residual[0] * u[1] - d.residual[1] * u[0];
+        let along = -(d.residual[0] * u[0] + d.residual[1] * u[1]);
+        let (depth, away) = (along / length, mean * length - along);
+        let spread = self.square_spread * length * length;
+        let explained = likelihood.explain(index, [across, away], along, spread, self.near, d.is_in_front);
+        let Explained {
+            usual,
+            near,
+            across: across_weight,
+            near_across: near_weight,
+            along: along_weight,
+            nats,
+        } = explained;
+        sums.nats.push(nats);
+        sums.usual += usual;
+        sums.near += near;
+        if across_weight <= 0.0 {
+            return;
+        }
+        let variance = likelihood.variance();
+        let share = spread / (variance + spread);
+        let deviation = share * (depth - mean);
+        sums.square_spread += usual * (deviation * deviation + share * variance / (length * length));
+        let turn = d.slope.map(|slope| d.y.cross(&slope));
+        let side = [turn, d.slope].map(|v| v[0] * u[1] - v[1] * u[0]);
+        // The lever of a near point is its own depth.
+        for (weight, rho) in [(across_weight - near_weight, mean + deviation), (near_weight, depth)] {
+            let [by_turn, by_unit] = side;
+            let row = Vector6::from_fn(|k, _| if k < 3 { by_turn[k] } else { by_unit[k - 3] * rho });
+            sums.equations.fixed_view_mut::<6, 6>(0, 0).ger(weight, &row, &row, 1.0);
+            let mut head = sums.gradient.fixed_rows_mut::<6>(0);
+            head += row * (weight * across);
+        }
+        let mut row = Parameters::zeros();
+        row.fixed_rows_mut::<3>(0).copy_from(&(turn[0] * u[0] + turn[1] * u[1]));
+        row.fixed_rows_mut::<3>(3).copy_from(&((d.slope[0] * u[0] + d.slope[1] * u[1]) * mean));
+        row.fixed_rows_mut::<TERMS>(6).copy_from(&(terms * length));
+        sums.equations.ger(along_weight, &row, &row, 1.0);
+        sums.gradient += row * (along_weight * away);
+    }
+}
+
+/// The normal equations with what is known of the field before any match is seen, factored.
+fn regularised(
+    sums: &Sums,
+    precisions: &Field,
+) -> Option<nalgebra::Cholesky<f64, nalgebra::Const<PARAMETERS>>> {
+    let mut equations = sums.equations;
+    for (k, precision) in precisions.iter().enumerate() {
+        equations[(6 + k, 6 + k)] += precision;
+    }
+    for k in 0..PARAMETERS {
+        equations[(k, k)] *= 1.0 + RIDGE;
+    }
+    equations.cholesky()
+}
