@@ -165,9 +165,9 @@ fn search<'a>(
     let size = options.solver.info().min_matches;
     let draws = Draws { rng, size, given: priors.ranked(observations) };
     let mut false_matches = None;
-    search.run(source.as_mut(), draws, &limits, &mut |pose, iterations| {
+    search.run(source.as_mut(), draws, &limits, &mut |pose, tries| {
         let false_matches = false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
-        false_alarms::log_false_alarms(pose, iterations, false_matches) > 0.0
+        false_alarms::log_false_alarms(pose, tries, false_matches) > 0.0
     });
     search
 }

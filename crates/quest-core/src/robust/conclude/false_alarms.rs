@@ -28,11 +28,11 @@ const WIDE: f64 = 3.0;
 const SOLUTIONS: f64 = 4.0;
 
 /// The base ten logarithm of the number of false alarms of a pose that was found among so many samples.
-pub(crate) fn log_false_alarms(pose: &ScoredPose, iterations: usize, false_matches: &Columns) -> f64 {
+pub(crate) fn log_false_alarms(pose: &ScoredPose, tries: usize, false_matches: &Columns) -> f64 {
     let chance = Chance::new(false_matches, &pose.scored.motion);
     let mut errors: Vec<f64> = pose.inlier_residuals().map(f64::abs).collect();
     errors.sort_unstable_by(f64::total_cmp);
-    least_log_false_alarms(pose.residuals().len(), &errors, &chance, SOLUTIONS * iterations as f64)
+    least_log_false_alarms(pose.residuals().len(), &errors, &chance, SOLUTIONS * tries as f64)
 }
 
 /// The same for the inliers' errors in ascending order.

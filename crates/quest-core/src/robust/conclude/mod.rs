@@ -55,7 +55,7 @@ pub(crate) fn conclude(
     let polished = refine_without_chance(poses, polished);
     let false_matches = false_alarms::false_matches(observations);
     let false_share = Chance::new(&false_matches, polished.motion()).share(poses.threshold());
-    let log_alarms = log_false_alarms(poses, &polished, found.iterations, blind, &false_matches);
+    let log_alarms = log_false_alarms(poses, &polished, found.tries, blind, &false_matches);
     let inliers = polished.pose.inliers.len();
     if inliers < MIN_MATCHES || log_alarms > max_false_alarms.log10() {
         return Err(no_pose(observations, inliers, false_share));
@@ -90,7 +90,7 @@ pub(crate) fn conclude(
 fn log_false_alarms(
     poses: &PoseScorer,
     polished: &Polished,
-    iterations: usize,
+    tries: usize,
     blind: Option<&Observations>,
     false_matches: &Columns,
 ) -> f64 {
@@ -98,13 +98,13 @@ fn log_false_alarms(
         if poses.observations.len() < MANY {
             return f64::NEG_INFINITY;
         }
-        return false_alarms::log_false_alarms(&polished.pose, iterations, false_matches);
+        return false_alarms::log_false_alarms(&polished.pose, tries, false_matches);
     };
     if blind.len() < MANY {
         return f64::NEG_INFINITY;
     }
     let pose = poses.of(blind).score(*polished.motion(), poses.threshold());
-    false_alarms::log_false_alarms(&pose, iterations, &false_alarms::false_matches(blind))
+    false_alarms::log_false_alarms(&pose, tries, &false_alarms::false_matches(blind))
 }
 
 /// Refuses inliers on a line, which determine a rotation and no translation. Within a threshold as wide as the image all are.
