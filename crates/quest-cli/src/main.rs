@@ -14,6 +14,7 @@ mod polynomials;
 mod progress;
 mod rows;
 mod servo;
+mod shell;
 mod simulate;
 mod solve;
 mod solvers;
@@ -24,7 +25,7 @@ mod writer;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -58,6 +59,8 @@ enum Command {
     Colmap(Box<colmap::Arguments>),
     Polynomials(Box<polynomials::Arguments>),
     Solvers(solvers::Arguments),
+    Completions(shell::Completions),
+    Man(shell::Manual),
 }
 
 /// What the exit status says of a run that went well.
@@ -96,6 +99,8 @@ fn main() -> ExitCode {
         Command::Colmap(arguments) => colmap::run(&arguments),
         Command::Polynomials(arguments) => polynomials::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => shell::manual(&arguments, Arguments::command()),
     };
     match result {
         Ok(Outcome::Answer) => ExitCode::SUCCESS,

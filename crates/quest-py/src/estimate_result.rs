@@ -534,6 +534,40 @@ impl Estimate {
         html::estimate(self)
     }
 
+    /// Inliers and outliers over both images, and the ellipses of the covariance. Needs matplotlib.
+    ///
+    /// Parameters
+    /// ----------
+    /// x1, x2 : array_like of shape (N, 2)
+    ///     The matches that were given to ``estimate``.
+    /// image1, image2 : array_like, optional
+    ///     The images, to be drawn below the matches.
+    /// figure : matplotlib.figure.Figure, optional
+    ///     Where to draw; a new figure of pyplot where not given.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.figure.Figure
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     Where matplotlib is not installed.
+    /// ShapeMismatch
+    ///     For another number of matches.
+    #[pyo3(signature = (x1, x2, *, image1=None, image2=None, figure=None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        x1: &Bound<'py, PyAny>,
+        x2: &Bound<'py, PyAny>,
+        image1: Option<&Bound<'py, PyAny>>,
+        image2: Option<&Bound<'py, PyAny>>,
+        figure: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("quest_pose._plot")?;
+        module.call_method1("estimate", (slf, x1, x2, image1, image2, figure))
+    }
+
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
         Ok((py.import("quest_pose._core")?.getattr("_estimate")?, (self.state(),)))
     }

@@ -10,6 +10,7 @@ mod polynomials;
 mod readme;
 mod replay;
 mod servo;
+mod shell;
 mod simulate;
 mod view;
 
