@@ -46,7 +46,6 @@ struct RunnerUpObject {
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
-#[expect(clippy::struct_field_names, reason = "the names that JavaScript sees, with their unit")]
 struct EvidenceObject {
     rotation_px: Option<f64>,
     planar_px: Option<f64>,

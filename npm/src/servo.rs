@@ -66,7 +66,7 @@ struct CommandObject {
 pub struct Servo {
     camera: Option<Camera>,
     features: usize,
-    core: CoreServo<Tracker<SolverName>, FreeCameraLaw>,
+    servo: CoreServo<Tracker<SolverName>, FreeCameraLaw>,
 }
 
 #[wasm_bindgen]
@@ -94,8 +94,8 @@ impl Servo {
         let options = FilterOptions::for_images(noise, images, &safety.limits, period, unit);
         let tracker = Tracker::new(&goal, solver, options);
         let rig = Rig { period, unit, ..Rig::default() };
-        let core = CoreServo::new(&goal, tracker, FreeCameraLaw { rate, unit }, safety).with_rig(rig);
-        Ok(Self { camera: given.camera, features: goal.len(), core })
+        let servo = CoreServo::new(&goal, tracker, FreeCameraLaw { rate, unit }, safety).with_rig(rig);
+        Ok(Self { camera: given.camera, features: goal.len(), servo })
     }
 
     /// The command for one image: rows `u, v` of the same features in the same order, NaN for those that are not seen.
@@ -112,12 +112,12 @@ impl Servo {
             )));
         }
         let features: Vec<_> = points.iter().map(|&p| point_on_plane(self.camera.as_ref(), p)).collect();
-        output::object(&CommandObject::from(&self.core.step(&features)))
+        output::object(&CommandObject::from(&self.servo.step(&features)))
     }
 
     /// Forgets everything but the goal.
     pub fn reset(&mut self) {
-        self.core.reset();
+        self.servo.reset();
     }
 }
 

@@ -143,7 +143,7 @@ export interface Command {
   linear: [number, number, number];
   /** The angular velocity in rad/s in the camera's frame. */
   angular: [number, number, number];
-  /** What the loop does: "tracking", "rotation_only", "exploring", "ambiguous", "coasting", or the reason why it holds. */
+  /** What the loop does: "tracking", "rotation_only", "exploring", "confirming", "ambiguous", "coasting", or the reason why it holds. */
   state: string;
   /** What it does and why, with numbers, and what helps. */
   advice: string;

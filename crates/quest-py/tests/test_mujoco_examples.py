@@ -18,12 +18,11 @@ def examples() -> Any:
     """The modules by name, or a skip where nothing can be rendered."""
     sys.path.insert(0, str(EXAMPLES))
     try:
+        world: Any = importlib.import_module("mujoco_world")
+        mujoco: Any = importlib.import_module("mujoco")
+        model = world.model(*world.scene(0)[:1], '<camera name="eye"/>' + world.scene(0)[1], world.scene(0)[2])
         try:
-            # Where there is no library to render with, the import fails, or the first image does.
-            world: Any = importlib.import_module("mujoco_world")
-            mujoco: Any = importlib.import_module("mujoco")
-            assets, body, files = world.scene(0)
-            mujoco.Renderer(world.model(assets, '<camera name="eye"/>' + body, files), 24, 32).close()
+            mujoco.Renderer(model, 24, 32).close()
         except Exception as error:
             pytest.skip(f"MuJoCo cannot render here ({error}): install libegl1 and libgl1-mesa-dri, or set MUJOCO_GL=osmesa")
         yield {name: importlib.import_module(f"mujoco_{name}") for name in ("world", "arm", "robot")}

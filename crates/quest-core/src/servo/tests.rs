@@ -6,6 +6,7 @@ use super::*;
 use crate::servo::simulation::scenario::{self, Features};
 use crate::solver::SolverName;
 use crate::{Candidates, RelativePose};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 const LIMITS: Limits = Limits { speed: 0.5, turn_rate: 0.6 };
@@ -195,6 +196,32 @@ fn a_clone_averages_the_first_images_too() {
         poses += usize::from(expected.is_ok());
     }
     assert!(poses > 0);
+}
+
+/// A tracker that is copied before every image works as the original does, through its start and beyond.
+#[test]
+fn a_tracker_can_be_copied_at_any_time() {
+    for (seed, count) in [(8, 5), (9, 8), (10, 30)] {
+        let rng = &mut scenario::generator(seed, 0);
+        let disturbances = Disturbances { noise_px: 0.5, ..Disturbances::default() };
+        let (world, plant) = robot(rng, count, &disturbances);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let mut original = Tracker::new(&goal, SolverName::Quest, world.filter_options(&LIMITS, 2.0));
+        let mut copy = original.clone();
+        let mut poses = 0;
+        let pose = plant.pose();
+        let seen: Vec<_> = world.points.iter().map(|x1| pose.q_21 * x1 + pose.t_21).collect();
+        for index in 0..60 {
+            let mut noise = || rng.random_range(-1e-3..1e-3);
+            let image: Vec<_> =
+                seen.iter().map(|x2| Some([x2.x / x2.z + noise(), x2.y / x2.z + noise()])).collect();
+            copy = copy.clone();
+            let expected = original.estimate(&image);
+            assert_eq!(copy.estimate(&image), expected, "{count} features, image {index}");
+            poses += usize::from(expected.is_ok());
+        }
+        assert!(poses > 20, "{count}: {poses}");
+    }
 }
 
 /// Turning gives way to features at the border.

@@ -378,6 +378,7 @@ class Command:
         "tracking",
         "rotation_only",
         "exploring",
+        "confirming",
         "ambiguous",
         "coasting",
         "starting",

@@ -28,7 +28,8 @@ pub(crate) struct Command {
     /// str : What the loop does.
     ///
     /// ``"tracking"``: the command follows the pose. ``"rotation_only"``: the images show no parallax, so that only the
-    /// rotation is commanded. ``"exploring"``: a small motion to the side to see parallax. ``"ambiguous"``: several poses
+    /// rotation is commanded. ``"exploring"``: a small motion to the side to see parallax. ``"confirming"``: the command
+    /// follows the pose slowly until the camera has been seen to go where it is sent. ``"ambiguous"``: several poses
     /// are alive that command different things; the likeliest is followed slowly. ``"coasting"``: this image gave no pose,
     /// the last command goes on. Everything else is a reason to hold: ``"starting"``, ``"too_few_features"``,
     /// ``"degenerate"`` (the features determine no pose), ``"inconsistent"`` (no pose explains them), ``"jump"`` (the pose

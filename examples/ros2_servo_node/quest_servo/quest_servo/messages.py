@@ -83,7 +83,7 @@ def fill_image(message, drawn, header):
 
 def fill_status(status, name, command, key_value):
     """A Command into a diagnostic_msgs/DiagnosticStatus. ``key_value`` is the class KeyValue."""
-    acts = command.state in ("tracking", "rotation_only", "exploring")
+    acts = command.state in ("tracking", "confirming", "rotation_only", "exploring")
     status.name, status.hardware_id, status.message = name, "", command.advice
     status.level = ERROR if command.state == "diverging" else STALE if command.state == "stale" else OK if acts else WARN
     numbers = {

@@ -19,6 +19,9 @@ use state::{State, Status, Step};
 /// before it has gone far.
 const AMBIGUOUS_SPEED: f64 = 0.4;
 
+/// How slowly a pose is followed until the camera is seen to go where it is sent: a second at 10 Hz, and a few centimetres.
+const CONFIRMING_SPEED: f64 = 0.3;
+
 /// After so many divergences the loop holds until it is reset: each took the camera a little further from its goal.
 const MOST_DIVERGENCES: usize = 3;
 
@@ -154,16 +157,20 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         let (mut state, wanted) = match estimate.support {
             Support::RotationOnly => (State::RotationOnly, self.law.turn(&pose)),
             Support::Several => (State::Ambiguous, self.law.command(&pose)),
+            Support::Unconfirmed => (State::Confirming, self.law.command(&pose)),
             Support::Full => (State::Tracking, self.law.command(&pose)),
         };
         let motion = self.memory.motion(seconds, self.rig.unit);
         let potential =
             self.law.potential(&self.rig.axes.of_pose(&pose)).filter(|_| state != State::RotationOnly);
-        if self.safety.watchdog && self.memory.watchdog.is_diverging(potential, &motion) {
+        let variance = estimate.covariance.map_or(0.0, |c| c.trace());
+        if self.safety.watchdog && self.memory.watchdog.is_diverging(potential, variance, &motion) {
             self.estimator.restart();
             return self.hold(features, HoldReason::Diverging, seconds);
         }
         let (wanted, border_limits) = self.guarded(wanted, features, state);
+        // To go another way rests on a pose of which it is known how good it is.
+        self.law.hindered(border_limits && estimate.covariance.is_some());
         if border_limits {
             self.memory.watchdog.forget();
         }
@@ -239,9 +246,12 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
             Mount::Camera | Mount::Hand(_) => self.rig.mount.carry(&self.rig.axes.of(&twist)),
         };
         let mut twist = self.safety.limits.apply(&twist);
-        if state == State::Ambiguous {
-            (twist.linear, twist.angular) = (twist.linear * AMBIGUOUS_SPEED, twist.angular * AMBIGUOUS_SPEED);
-        }
+        let share = match state {
+            State::Ambiguous => AMBIGUOUS_SPEED,
+            State::Confirming => CONFIRMING_SPEED,
+            _ => 1.0,
+        };
+        (twist.linear, twist.angular) = (twist.linear * share, twist.angular * share);
         (twist, border_limits)
     }
 }

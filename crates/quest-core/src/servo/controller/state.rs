@@ -15,6 +15,8 @@ pub enum State {
     RotationOnly,
     /// A deliberate small motion to the side, so that the images show parallax.
     Exploring,
+    /// There is a pose, but the camera has not yet been seen to go where it is sent: the command follows it slowly.
+    Confirming,
     /// Several poses are alive and command different things: the best is followed slowly until the motion tells them apart.
     Ambiguous,
     /// This image gave no pose. The last command goes on, for as many images as [`Safety`](crate::servo::Safety) allows.
@@ -31,6 +33,7 @@ impl State {
             Self::Tracking => "tracking",
             Self::RotationOnly => "rotation_only",
             Self::Exploring => "exploring",
+            Self::Confirming => "confirming",
             Self::Ambiguous => "ambiguous",
             Self::Coasting => "coasting",
             Self::Holding(reason) => reason.name(),
@@ -113,6 +116,10 @@ impl Display for Advice<'_> {
                 "The {seen} features show no parallax, so the loop only turns. If the camera is not at the goal, allow `explore`, give `depths`, or start further away."
             ),
             State::Exploring => f.write_str("The loop moves a little to the side to see parallax."),
+            State::Confirming => write!(
+                f,
+                "The loop follows {inliers} of {seen} features, slowly until it has seen that the camera goes where it is sent."
+            ),
             State::Ambiguous => write!(
                 f,
                 "{hypotheses} poses explain the images; the loop moves slowly until its motion tells them apart. More features or known `depths` help."

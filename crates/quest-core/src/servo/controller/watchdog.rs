@@ -29,7 +29,9 @@ pub(crate) struct Watchdog {
 
 impl Watchdog {
     /// Takes in the law's potential of a pose and the motion commanded before it; whether V has not fallen although it should have.
-    pub(crate) fn is_diverging(&mut self, potential: Option<f64>, motion: &Motion) -> bool {
+    ///
+    /// `variance` is that of the pose's six numbers, added up: within three standard deviations of the goal noise decides.
+    pub(crate) fn is_diverging(&mut self, potential: Option<f64>, variance: f64, motion: &Motion) -> bool {
         let Some(value) = potential else {
             self.forget();
             return false;
@@ -44,7 +46,7 @@ impl Watchdog {
             return false;
         }
         self.first = None;
-        let diverges = value > LEAST && value > FALLEN * first;
+        let diverges = value > LEAST.max(9.0 * variance) && value > FALLEN * first;
         self.found += usize::from(diverges);
         diverges
     }
@@ -52,5 +54,28 @@ impl Watchdog {
     /// Begins a new window: what happened in between is not the law's doing.
     pub(crate) fn forget(&mut self) {
         self.first = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    /// Whether forty images of motion, each with this potential, are found diverging.
+    fn diverges(potential: impl Fn(i32) -> f64, variance: f64) -> bool {
+        let motion = Motion { linear: Vector3::new(0.01, 0.0, 0.0), angular: Vector3::zeros() };
+        let mut watchdog = Watchdog::default();
+        (0..40).any(|k| watchdog.is_diverging(Some(potential(k)), variance, &motion))
+    }
+
+    #[test]
+    fn a_distance_that_does_not_fall_is_found_unless_noise_decides() {
+        let falling = |k| 0.09 * 0.95_f64.powi(2 * k);
+        assert!(!diverges(falling, 0.0));
+        assert!(diverges(|_| 0.09, 0.0));
+        assert!(diverges(|k| 0.09 + 0.001 * f64::from(k), 1e-4));
+        // Within three standard deviations of the goal.
+        assert!(!diverges(|_| 0.09, 0.02));
     }
 }

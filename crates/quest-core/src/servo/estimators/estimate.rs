@@ -12,6 +12,8 @@ pub enum Support {
     /// The rotation alone: there is no parallax that stands clear of the noise, or the depths are too uncertain for a translation to
     /// point the right way.
     RotationOnly,
+    /// Rotation and translation, but the camera has not yet been seen to go where it was sent.
+    Unconfirmed,
     /// Several poses that command different things; this is the likeliest.
     Several,
 }

@@ -29,6 +29,9 @@ pub trait ControlLaw {
         Twist { linear: direction, angular: Vector3::zeros() }
     }
 
+    /// Whether the border of the image was in the way of the last command: a law that knows another way may take it.
+    fn hindered(&mut self, _is_hindered: bool) {}
+
     /// Forgets what it remembers of earlier images.
     fn reset(&mut self) {}
 }
@@ -49,6 +52,10 @@ impl<L: ControlLaw + ?Sized> ControlLaw for &mut L {
 
     fn exploration(&self, attempt: usize) -> Twist {
         (**self).exploration(attempt)
+    }
+
+    fn hindered(&mut self, is_hindered: bool) {
+        (**self).hindered(is_hindered);
     }
 
     fn reset(&mut self) {

@@ -9,6 +9,7 @@ use nalgebra::Matrix6;
 
 use crate::servo::estimators::tracker::adjust::{Survey, Workspace, solve};
 use crate::servo::estimators::tracker::map::Map;
+use crate::servo::estimators::tracker::resection::Point;
 
 impl Workspace {
     /// Finds the adequacy of a map, infinite where its features do not determine a pose, and its information.
@@ -20,6 +21,13 @@ impl Workspace {
         map.log_information = diagonal.map(|d| 2.0 * d.ln()).sum();
     }
 
+    /// Whether a pose rests on this feature: a wrong match, whose depth nothing tells, has no say in a pose either.
+    fn counts(&self, i: usize, point: &Point) -> bool {
+        const HARDLY: f64 = 0.1;
+        let feature = &self.features[i];
+        if feature.is_used { feature.weight > HARDLY } else { point.is_mapped }
+    }
+
     fn adequacy(&mut self, map: &Map, survey: &Survey<'_>) -> f64 {
         self.eliminate(map, survey, 0.0);
         let size = self.size;
@@ -28,7 +36,7 @@ impl Workspace {
         }
         let mut normal = Matrix6::zeros();
         for (i, point) in map.points.iter().enumerate() {
-            if self.features[i].is_used || point.is_mapped {
+            if self.counts(i, point) {
                 for row in rows(point.place, point.rho) {
                     let row = nalgebra::Vector6::from(row);
                     normal.ger(1.0, &row, &row, 1.0);
@@ -42,10 +50,10 @@ impl Workspace {
         let stride = self.mixed.len() / self.features.len().max(1);
         let mut variance = 0.0;
         for (i, point) in map.points.iter().enumerate() {
-            let feature = &self.features[i];
-            if !(feature.is_used || point.is_mapped) {
+            if !self.counts(i, point) {
                 continue;
             }
+            let feature = &self.features[i];
             let influence = influence(point.place, point.rho, &inverse);
             let own = if feature.is_used { feature.inverse[5] } else { point.variance };
             variance += own * influence.iter().map(|c| c * c).sum::<f64>();

@@ -7,7 +7,9 @@ use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion, PoseEstim
 use crate::servo::estimators::source::PoseSource;
 use crate::servo::estimators::tracker::hypothesis::Hypothesis;
 use crate::servo::estimators::tracker::resection::{INLIER, Task, resect, residuals};
-use crate::servo::estimators::tracker::{DULL, NEXT_TO_GOAL, Phase, Tracker, VERY_FEW, most_inadequate};
+use crate::servo::estimators::tracker::{
+    DULL, NEXT_TO_GOAL, Phase, RISEN, Tracker, VERY_FEW, most_inadequate,
+};
 
 /// No image counts for more than this: the odds of 1 to 300,000 that a false one may cost the truth.
 const MOST_OF_ONE_IMAGE: f64 = 25.0;
@@ -21,6 +23,16 @@ const SEEN_SHARE: f64 = 0.5;
 const ENOUGH_MAPPED: usize = 12;
 /// After so many images in which the lone hypothesis contradicts the commands the estimator begins anew.
 const CONTRADICTED: usize = 5;
+/// The mean squared residual of the inliers may rise to so many times its least, two at the lowest, for so many images in a row.
+const WORSE: f64 = 2.2;
+const WORSE_IMAGES: usize = 8;
+/// A camera that was not told to go further than this since the last image stands still, and its image weighs so much.
+const STANDING: f64 = 2e-4;
+const STANDING_WEIGHT: f64 = 0.05;
+/// A standing camera waits so many times longer before it begins anew: it would see the same again.
+const PATIENT: usize = 5;
+/// Closer to the goal than this no motion has to be confirmed: what is left is too short for that.
+const CLOSE: f64 = 0.01;
 
 impl<S: PoseSource> Tracker<S> {
     /// Fits the image by every hypothesis, adds up their costs, and puts the best first.
@@ -40,10 +52,23 @@ impl<S: PoseSource> Tracker<S> {
                 self.trust[i] += 0.1 * (f64::from(u8::from(self.inliers[i])) - self.trust[i]);
             }
         }
+        self.compare_with_best();
         if fit.inliers < self.least_inliers() && fit.seen < self.least_inliers() {
             return Err(HoldReason::TooFewFeatures);
         }
         Ok(())
+    }
+
+    /// Whether the map explains the images worse than it once did: wrong depths fit where they were learnt, and nowhere else.
+    fn compare_with_best(&mut self) {
+        let inliers = self.hypotheses[0].squares.iter().filter(|s| **s < INLIER);
+        let (sum, count) = inliers.fold((0.0, 0usize), |(sum, count), s| (sum + s, count + 1));
+        if count < VERY_FEW || self.phase != Phase::Mapped {
+            return;
+        }
+        let mean = (sum / count as f64).max(2.0);
+        self.best_mean = self.best_mean.min(mean);
+        self.worse = if mean > WORSE * self.best_mean { self.worse + 1 } else { 0 };
     }
 
     /// Fits the image on one map, from where the camera was or was sent, whichever explains it better.
@@ -78,9 +103,12 @@ impl<S: PoseSource> Tracker<S> {
         let cost = |h: &Hypothesis| h.fit.map_or(f64::INFINITY, |fit| fit.cost);
         let alive = &mut self.hypotheses[..self.count];
         let least = alive.iter().map(cost).fold(f64::INFINITY, f64::min);
+        // Images from one place share the errors of the goal image and of the map: they are no evidence that adds up.
+        let moves = self.motion.linear.norm() > STANDING;
         for h in alive.iter_mut() {
             let more = cost(h) - least;
-            h.score += if more.is_nan() { MOST_OF_ONE_IMAGE } else { more.min(MOST_OF_ONE_IMAGE) };
+            let more = if more.is_nan() { MOST_OF_ONE_IMAGE } else { more.min(MOST_OF_ONE_IMAGE) };
+            h.score += if moves { more } else { STANDING_WEIGHT * more };
         }
         alive.sort_by(|a, b| a.score.total_cmp(&b.score));
         let best = alive[0].score;
@@ -136,20 +164,24 @@ impl<S: PoseSource> Tracker<S> {
             return;
         }
         let is_alone = self.count == 1;
+        let mut reversed = 0;
         for h in &mut self.hypotheses[..self.count] {
             let odometry = h.track.judge(&h.pose, turn, way);
+            reversed += usize::from(odometry.is_reversed);
             if is_alone {
                 self.contradicted = if odometry.contradicts { self.contradicted + 1 } else { 0 };
             } else {
-                h.score += odometry.score;
+                h.score += if odometry.is_reversed { HOPELESS } else { odometry.score };
             }
+        }
+        if reversed == self.count {
+            self.contradicted = CONTRADICTED;
         }
     }
 
     /// The estimate of an accepted image, by how much of it can be acted on.
     pub(super) fn judge(&mut self) -> Result<Estimate, HoldReason> {
-        if self.contradicted >= CONTRADICTED {
-            self.contradicted = 0;
+        if self.contradicted >= CONTRADICTED || self.worse >= WORSE_IMAGES {
             self.restart();
             return Err(HoldReason::Inconsistent);
         }
@@ -162,18 +194,21 @@ impl<S: PoseSource> Tracker<S> {
             support = Support::RotationOnly;
             pose.t_21 = Vector3::zeros();
         } else {
-            let is_adequate = first.map.adequacy < most_inadequate(first);
+            self.has_been_far |= first.pose.t_21.norm() > NEXT_TO_GOAL || self.goal.len() < VERY_FEW;
+            let is_adequate = first.map.adequacy < most_inadequate(first) && !self.is_unsure_beside_goal();
             self.dull = if is_adequate { 0 } else { self.dull + 1 };
-            if self.dull > DULL {
+            let patience = if self.hypotheses[0].track.has_moved() { DULL } else { PATIENT * DULL };
+            if self.dull > patience {
                 self.restart();
                 return Err(HoldReason::Starting);
             }
             let disagree = self.hypotheses[1..self.count].iter().any(|h| h.disagrees(first));
-            self.has_been_far |= first.pose.t_21.norm() > NEXT_TO_GOAL || self.goal.len() < VERY_FEW;
             if !is_adequate || (disagree && !self.has_been_far) {
                 support = Support::RotationOnly;
             } else if disagree {
                 support = Support::Several;
+            } else if !first.track.is_confirmed && first.pose.t_21.norm() > CLOSE {
+                support = Support::Unconfirmed;
             }
         }
         self.is_turning_only = support == Support::RotationOnly;
@@ -190,11 +225,27 @@ impl<S: PoseSource> Tracker<S> {
         })
     }
 
-    /// Begins anew where a rotation does not explain the images any more: parallax came.
+    /// Whether the hypotheses of a start beside the goal differ by half of the way, or do not all know the depths: which of them is
+    /// followed decides there whether the camera comes nearer.
+    fn is_unsure_beside_goal(&self) -> bool {
+        if self.has_been_far || self.options.plane.is_some() || self.goal.len() < VERY_FEW {
+            return false;
+        }
+        let first = &self.hypotheses[0];
+        self.hypotheses[1..self.count].iter().any(|h| {
+            let (a, b) = (&first.pose.t_21, &h.pose.t_21);
+            let differs = (a - b).norm() > 0.5 * a.norm().max(b.norm());
+            differs || h.map.adequacy > most_inadequate(h)
+        })
+    }
+
+    /// Begins anew where a rotation explains the images worse than it did: parallax came.
     fn leave_rotation(&mut self, cost: f64, seen: usize) -> Result<(), HoldReason> {
         let n = seen as f64;
-        let expected = 2.0 * n + 5.0 * (4.0 * n).sqrt() + 6.0;
-        let explains = cost < expected.max(self.rotation_limit);
+        // Of the features' squared residuals, two each, the sum varies by √(4 n).
+        let least = if self.rotation_level.is_nan() { cost / n } else { self.rotation_level };
+        self.rotation_level = least.min(cost / n).max(2.0);
+        let explains = cost < self.rotation_level * n + 5.0 * (4.0 * n).sqrt() + RISEN;
         let explores = self.travel.norm() > 1e-3;
         self.unexplained = if explains || explores { 0 } else { self.unexplained + 1 };
         if self.unexplained >= 3 {

@@ -64,6 +64,17 @@ impl Hypothesis {
 pub(crate) struct Track {
     entries: [Entry; Track::LENGTH],
     count: usize,
+    /// Where the way that is judged next began, and so many images ago.
+    anchor: Option<Entry>,
+    since: usize,
+    /// Where it all began, and the last image.
+    begin: Option<Entry>,
+    last: Option<Entry>,
+    /// The mean square of how far a pose is from where the commands took the last one, over so many images.
+    scatter: f64,
+    judged: usize,
+    /// Whether the camera has been seen to go where it was sent.
+    pub(crate) is_confirmed: bool,
     /// The commanded way in the goal's frame, and the commanded rotation, since the start.
     way: Vector3<f64>,
     turn: UnitQuaternion<f64>,
@@ -84,6 +95,8 @@ pub(crate) struct Odometry {
     pub(crate) score: f64,
     /// Whether it contradicts the commands beyond what noise and delay explain.
     pub(crate) contradicts: bool,
+    /// Whether the camera went the other way, over a way that says something.
+    pub(crate) is_reversed: bool,
 }
 
 impl Track {
@@ -91,9 +104,27 @@ impl Track {
     const LENGTH: usize = 9;
     /// An entry is added after so much motion, so that slow cameras and fast images do not shorten the window to nothing.
     const STEP: f64 = 2e-3;
+    /// A way is judged after so many images at the earliest, three of them delayed,
+    const IMAGES: usize = 6;
+    /// and once it is longer than this and so many standard deviations of a pose,
+    const WAY: f64 = 4e-3;
+    const DEVIATIONS: f64 = 5.0;
+    /// but whether the camera went the other way at this length, whatever they are.
+    const LONG_WAY: f64 = 0.1;
+    /// Further from the start than this an unconfirmed pose does not take the camera.
+    const UNCONFIRMED: f64 = 0.2;
+    /// The weight of an image in the scatter of the poses.
+    const WEIGHT: f64 = 0.1;
+    /// The motion seen is within 60° of the one commanded where it confirms it.
+    const CONFIRMS: f64 = 0.5;
 
     pub(crate) fn clear(&mut self) {
         *self = Self::default();
+    }
+
+    /// Whether the camera was told to go anywhere.
+    pub(crate) fn has_moved(&self) -> bool {
+        self.way.norm() > 0.01
     }
 
     /// Takes in a command, from the pose before it.
@@ -106,33 +137,120 @@ impl Track {
     /// Takes in a pose, with its standard deviations, and holds it against the commands.
     pub(crate) fn judge(&mut self, pose: &RelativePose, turn_deviation: f64, way_deviation: f64) -> Odometry {
         let now = Entry { centre: pose.inverse().t_21, q_21: pose.q_21, way: self.way, turn: self.turn };
-        let mut odometry = Odometry::default();
-        let is_full = self.count >= Self::LENGTH;
+        let deviation = way_deviation.max(self.scatter_with(&now));
+        let is_reversed = self.judge_way(&now, deviation);
+        let mut odometry = Odometry { score: 0.0, contradicts: is_reversed, is_reversed };
         let last = self.entries[(self.count + Self::LENGTH - 1) % Self::LENGTH];
         let stirred = (now.way - last.way).norm() + now.turn.angle_to(&last.turn) > Self::STEP;
-        if is_full && stirred {
+        if self.count >= Self::LENGTH && stirred {
             let first = self.entries[self.count % Self::LENGTH];
             let (way, moved) = (now.way - first.way, now.centre - first.centre);
             let length = way.norm();
-            // The sign alone counts, the unit is a guess: 1 for the truth, −1 for the reversed scene.
-            let along = moved.dot(&way) / length.powi(2).max(f64::MIN_POSITIVE);
             let commanded = (now.turn * first.turn.inverse()).scaled_axis();
             let turned = (now.q_21 * first.q_21.inverse()).scaled_axis();
-            let is_reversed = length > 0.015 + 3.0 * way_deviation.min(0.02) && along < 0.1;
-            let turns_otherwise =
+            odometry.contradicts |=
                 (turned - commanded).norm() > 0.6 * commanded.norm() + 0.03 + 4.0 * turn_deviation;
-            odometry.contradicts = is_reversed || turns_otherwise;
             if length > 0.006 {
+                let along = moved.dot(&way) / length.powi(2);
                 odometry.score = 2.0 * (0.5 - along).clamp(-0.5, 1.0);
             }
-            if odometry.contradicts {
-                odometry.score += 5.0;
-            }
+        }
+        if odometry.contradicts {
+            odometry.score += 5.0;
+            self.is_confirmed = false;
         }
         if stirred || self.count == 0 {
             self.entries[self.count % Self::LENGTH] = now;
             self.count += 1;
         }
         odometry
+    }
+
+    /// Takes in how far this pose is from where the commands took the last one; the standard deviation of a pose by that. Wrong
+    /// poses scatter more than their covariance says.
+    fn scatter_with(&mut self, now: &Entry) -> f64 {
+        if let Some(last) = self.last.replace(*now) {
+            let off = ((now.centre - last.centre) - (now.way - last.way)).norm_squared();
+            self.judged += 1;
+            let weight = Self::WEIGHT.max(1.0 / self.judged as f64);
+            self.scatter += weight * (off - self.scatter);
+        }
+        // Of a difference of two.
+        (0.5 * self.scatter).sqrt()
+    }
+
+    /// Judges the way since the last judgement once it is long enough to say something: whether it contradicts the commands.
+    ///
+    /// The sign alone counts, the unit is a guess: the camera of the reversed scene goes the other way.
+    fn judge_way(&mut self, now: &Entry, deviation: f64) -> bool {
+        let begin = *self.begin.get_or_insert(*now);
+        let first = *self.anchor.get_or_insert(*now);
+        self.since += 1;
+        let (way, moved) = (now.way - first.way, now.centre - first.centre);
+        let length = way.norm();
+        let full = Self::WAY + Self::DEVIATIONS * deviation;
+        if self.since <= Self::IMAGES || length < full.min(Self::LONG_WAY) || length.is_nan() {
+            return false;
+        }
+        let along = moved.dot(&way);
+        // Unseen motion contradicts too.
+        if along < 0.1 * length * length {
+            (self.anchor, self.since) = (Some(*now), 0);
+            return true;
+        }
+        if length >= full {
+            (self.anchor, self.since) = (Some(*now), 0);
+            self.is_confirmed |= along > Self::CONFIRMS * moved.norm() * length;
+        }
+        !self.is_confirmed && (now.way - begin.way).norm() > Self::UNCONFIRMED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A camera that turns and moves as it is told, as a hypothesis sees it whose centres are stretched by `stretch`.
+    fn judged(stretch: f64, images: usize) -> (Vec<Odometry>, Track) {
+        let motion =
+            Motion { linear: Vector3::new(0.004, -0.002, 0.003), angular: Vector3::new(0.0, 0.01, 0.005) };
+        let (mut track, mut truth) = (Track::default(), RelativePose::identity());
+        let mut all = Vec::new();
+        for _ in 0..images {
+            let centre = truth.inverse().t_21 * stretch;
+            let seen = RelativePose::new(truth.q_21, -(truth.q_21 * centre));
+            all.push(track.judge(&seen, 1e-3, 1e-3));
+            track.moved(&motion, &truth);
+            let turn = UnitQuaternion::new(-motion.angular);
+            truth = RelativePose::new(turn * truth.q_21, turn * truth.t_21 - motion.linear);
+        }
+        (all, track)
+    }
+
+    #[test]
+    fn a_camera_that_goes_where_it_is_sent_is_confirmed_whatever_its_unit() {
+        for stretch in [0.2, 1.0, 5.0] {
+            let (all, track) = judged(stretch, 40);
+            assert!(track.is_confirmed, "{stretch}");
+            assert!(all.iter().all(|o| !o.contradicts && !o.is_reversed), "{stretch}");
+        }
+    }
+
+    #[test]
+    fn the_reversed_scene_is_found_out_within_a_few_images() {
+        let (all, track) = judged(-1.0, 12);
+        assert!(all.iter().any(|o| o.is_reversed) && !track.is_confirmed);
+    }
+
+    #[test]
+    fn nothing_is_said_of_a_camera_that_stands_still() {
+        let mut track = Track::default();
+        let still = Motion { linear: Vector3::zeros(), angular: Vector3::zeros() };
+        for k in 0..40 {
+            let noisy = RelativePose::new(UnitQuaternion::identity(), Vector3::x() * 1e-3 * f64::from(k % 3));
+            let odometry = track.judge(&noisy, 1e-3, 1e-3);
+            assert!(!odometry.contradicts && !track.is_confirmed);
+            track.moved(&still, &noisy);
+        }
     }
 }

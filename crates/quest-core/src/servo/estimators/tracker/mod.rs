@@ -2,12 +2,13 @@
 //!
 //! An image is worked on by these steps, of which [`estimate`](PoseEstimator::estimate) reads:
 //!
-//! 1. **Average** the first images; **search** hypotheses among their matches (`start.rs`): rotations, planes and scenes with relief.
+//! 1. **Average** the first images; **search** hypotheses among their matches (`start/`): rotations, planes and scenes with relief.
 //! 2. **Follow**: each hypothesis alive finds the pose of the image on its map (`resection.rs`). The costs add up, with what the
-//!    commanded motion says (`hypothesis.rs`); hopeless hypotheses are dropped.
+//!    commanded motion says (`hypothesis.rs`); hopeless hypotheses are dropped, and one that sees the camera go another way than it was
+//!    sent. Until the camera has been seen to go where it is sent the pose is [`Unconfirmed`](Support::Unconfirmed).
 //! 3. **Gate**: enough features agree, and the camera can have come there since the last image.
 //! 4. **Learn**: an image from somewhere new becomes a key image, and the map is adjusted by one damped step an image until it
-//!    settles (`adjust.rs`).
+//!    settles (`adjust/`).
 //! 5. **Judge**: where the depths are not known well enough for a translation to point the right way only the rotation counts
 //!    (`adequacy.rs`).
 //!
@@ -42,8 +43,8 @@ const MOST_OF_MANY: usize = 3;
 /// eight were no better with twenty features.
 const KEYS_OF_FEW: usize = 6;
 const KEYS_OF_MANY: usize = 3;
-/// The start's rotation is left where its cost has risen by so much: see [`Tracker::leave_rotation`].
-const RISEN: f64 = 15.0;
+/// The start's rotation is left where its cost has risen by so much, and more than chance: see [`Tracker::leave_rotation`].
+const RISEN: f64 = 10.0;
 /// The adequacy below which a translation is commanded; up to three times as much where the goal is further than
 /// [`FAR`](Self), for there is time to learn.
 const ADEQUATE: f64 = 0.4;
@@ -105,12 +106,15 @@ pub struct Tracker<S> {
     scratch: Vec<f64>,
     /// Images since the last accepted pose.
     missed: usize,
-    /// The cost above which a rotation does not explain an image.
-    rotation_limit: f64,
+    /// The least cost a feature of a rotation so far; NaN before the first.
+    rotation_level: f64,
     /// Images in a row: rotations that do not explain, maps that are not adequate, lone hypotheses that contradict the commands.
     unexplained: usize,
     dull: usize,
     contradicted: usize,
+    /// The least mean squared residual of the inliers so far, and for how many images it has been far above.
+    best_mean: f64,
+    worse: usize,
     /// Whether the camera has been further from the goal than next to it since the start.
     has_been_far: bool,
     /// Whether the last estimate was of the rotation alone.
@@ -152,10 +156,12 @@ impl<S: PoseSource> Tracker<S> {
             squares: vec![f64::NAN; n],
             scratch: Vec::with_capacity(n),
             missed: 0,
-            rotation_limit: 0.0,
+            rotation_level: f64::NAN,
             unexplained: 0,
             dull: 0,
             contradicted: 0,
+            best_mean: f64::INFINITY,
+            worse: 0,
             has_been_far: false,
             is_turning_only: false,
             restarts: 0,
@@ -272,21 +278,20 @@ impl<S: PoseSource> Tracker<S> {
 
     /// Chooses between rotation and map, and takes over the hypotheses.
     fn conclude(&mut self) -> Result<(), HoldReason> {
-        let n = self.start.consensus.matches.len() as f64;
         let pool = &self.start.pool[..self.start.count];
-        let best = pool.first().filter(|h| h.start_cost <= 9.0 * n);
-        let is_rotation = self.start.rotation.is_some_and(|r| Self::prefers_rotation(&r, pool));
-        if !is_rotation && best.is_none() {
+        let is_rotation = self.start.rotation.is_some_and(|r| self.prefers_rotation(&r, pool));
+        if !is_rotation && pool.is_empty() {
             return Err(HoldReason::Inconsistent);
         }
         self.missed = 0;
         (self.unexplained, self.dull, self.contradicted) = (0, 0, 0);
+        (self.best_mean, self.worse) = (f64::INFINITY, 0);
         self.has_been_far = false;
         self.trust.fill(1.0);
         if is_rotation {
             let Some(fit) = self.start.rotation else { return Err(HoldReason::Inconsistent) };
             self.phase = Phase::Rotation;
-            self.rotation_limit = fit.cost + RISEN;
+            self.rotation_level = f64::NAN;
             let first = &mut self.hypotheses[0];
             first.map.forget(&self.goal, &self.known, self.options.spread);
             (first.pose, first.score, self.count) = (fit.pose, 0.0, 1);
@@ -299,11 +304,14 @@ impl<S: PoseSource> Tracker<S> {
     }
 
     /// Whether the first images are explained by a rotation, or by nothing that a translation could rest on.
-    fn prefers_rotation(rotation: &resection::Fit, pool: &[Hypothesis]) -> bool {
+    fn prefers_rotation(&self, rotation: &resection::Fit, pool: &[Hypothesis]) -> bool {
         /// Answers so close in score to the best are as good as it.
         const NEAR: f64 = 8.0;
         /// Next to the goal those count that are not hopeless.
         const POSSIBLE: f64 = 15.0;
+        /// And here nothing but evidence will do: the goal is an unstable point of the loop with wrong depths.
+        const CAREFUL: f64 = 30.0;
+        const CAREFUL_ADEQUACY: f64 = 0.3;
         let n = rotation.seen as f64;
         let score = rotation.cost + rotation.pose.q_21.angle().powi(2);
         let Some(best) = pool.first() else { return rotation.cost < 9.0 * n };
@@ -314,13 +322,21 @@ impl<S: PoseSource> Tracker<S> {
             return true;
         }
         let way = best.pose.t_21.norm();
-        let margin = if way < NEXT_TO_GOAL { POSSIBLE } else { NEAR };
+        let is_close = way < NEXT_TO_GOAL;
+        // A plane that the base keeps to, or few features, whose hypotheses are all kept, need less of it.
+        let is_careful = is_close && self.options.plane.is_none() && self.goal.len() >= VERY_FEW;
+        let (margin, cosine) = match (is_careful, is_close) {
+            (true, _) => (CAREFUL, 0.8),
+            (_, true) => (POSSIBLE, 0.3),
+            _ => (NEAR, 0.3),
+        };
         let near = || pool.iter().take_while(move |h| h.score < best.score + margin);
         if rotation.cost >= 9.0 * n || way >= 0.1 {
             return false;
         }
-        let inadequate = near().any(|h| h.map.adequacy > most_inadequate(h));
-        let apart = near().any(|h| h.pose.t_21.dot(&best.pose.t_21) < 0.3 * h.pose.t_21.norm() * way);
+        let most = |h: &Hypothesis| if is_careful { CAREFUL_ADEQUACY } else { most_inadequate(h) };
+        let inadequate = near().any(|h| h.map.adequacy > most(h));
+        let apart = near().any(|h| h.pose.t_21.dot(&best.pose.t_21) < cosine * h.pose.t_21.norm() * way);
         inadequate || apart
     }
 
@@ -328,7 +344,8 @@ impl<S: PoseSource> Tracker<S> {
     fn take_over(&mut self) {
         /// Odds of 1 to 300,000.
         const HOPELESS: f64 = 25.0;
-        const OTHER_CLASS: f64 = 15.0;
+        /// A plane with many wrong matches, and a scene with relief: the first motion tells them apart.
+        const OTHER_CLASS: f64 = 40.0;
         let pool = &self.start.pool[..self.start.count];
         let best = pool[0].score;
         let class = pool[0].map.is_planar();

@@ -67,6 +67,7 @@ impl<S: PoseSource> Tracker<S> {
         self.keys[0].variance = self.options.noise.powi(2);
         (self.key_count, self.phase) = (1, Phase::Mapped);
         (self.missed, self.dull, self.contradicted) = (0, 0, 0);
+        (self.best_mean, self.worse) = (f64::INFINITY, 0);
         self.trust.fill(1.0);
         self.motion = Motion { linear: Vector3::zeros(), angular: Vector3::zeros() };
         true

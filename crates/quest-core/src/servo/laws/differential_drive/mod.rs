@@ -39,12 +39,28 @@
 //!   the running mean of `t` over some images: the smallest `r` of many noisy ones comes long before the goal does.
 //! - **Turning fades** with `r² / (r² + f²)` for the same reason.
 //! - **Hysteresis.** `s` changes only beyond `|cos φ| > 0.1`.
+//! - **Backing off.** A robot beside its goal has to turn away from the features to get there. Where the border of the image does
+//!   not let it turn the robot drives back, leaning to the side on which that takes it behind the goal, until the direction
+//!   `α = φ + θ` from it to the goal is so close to the goal's heading that it can drive there with the features in view. From x
+//!   beside the goal, with the lean β, the way back and forth is about `x / tan β`.
 
 use crate::RelativePose;
 use crate::servo::{ControlLaw, Twist};
 
 /// `s` changes where the cosine of the bearing exceeds this: six degrees past sideways.
 const SIDEWAYS: f64 = 0.1;
+/// The robot backs off where the border has been in its way for so many images in a row,
+const HINDERED: usize = 4;
+/// and the sine of the goal's bearing is larger than this: seven degrees.
+const OFF_COURSE: f64 = 0.12;
+/// It has backed off far enough where the sine of the goal's direction is smaller than this: four degrees, which the view of most
+/// cameras allows.
+const IN_LINE: f64 = 0.07;
+/// How far it leans to the side meanwhile, in radians, and its speed as a share of the gain.
+const LEAN: f64 = 0.35;
+const BACKING_SPEED: f64 = 0.4;
+/// So often at most: each time takes it closer to the line behind the goal.
+const MOST_BACKINGS: usize = 6;
 
 /// The distance, bearing and heading of a robot that moves on a plane, from its pose relative to the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +84,12 @@ impl PlanarPose {
             heading: (r[(2, 0)] - r[(0, 2)]).atan2(r[(0, 0)] + r[(2, 2)]),
         }
     }
+
+    /// The direction from the robot to the goal in the goal's frame, in radians: zero behind the goal, positive to the right.
+    #[must_use]
+    pub fn direction(&self) -> f64 {
+        self.bearing + self.heading
+    }
 }
 
 /// The switching law (C.4) to (C.7), its signs derived at the head of the module.
@@ -89,6 +111,11 @@ pub struct DifferentialDriveLaw {
     pub fade_distance: f64,
     /// Whether the robot is close enough to stop is judged by the mean over about so many images; 1 for none but the last.
     pub averaged_images: f64,
+    /// The robot backs off no further from the goal than this; 0 for never.
+    pub furthest_back: f64,
+    /// For so many images in a row the border of the image has been in the way.
+    hindered: usize,
+    backings: usize,
     /// `(tx, tz)`, averaged; none before the first image.
     mean: Option<[f64; 2]>,
     phase: Phase,
@@ -101,6 +128,8 @@ enum Phase {
     Start,
     /// Driving with this sign `s`.
     Driving(f64),
+    /// Driving back, to get behind the goal.
+    Backing,
     /// At the goal, turning to its heading.
     Turning,
 }
@@ -117,6 +146,9 @@ impl DifferentialDriveLaw {
             start_distance: 0.12,
             fade_distance: 0.02,
             averaged_images: 10.0,
+            furthest_back: 1.5,
+            hindered: 0,
+            backings: 0,
             mean: None,
             phase: Phase::Start,
         }
@@ -131,6 +163,7 @@ impl DifferentialDriveLaw {
             start_distance: stop_distance,
             fade_distance: 0.0,
             averaged_images: 1.0,
+            furthest_back: 0.0,
             ..Self::new(speed_gain, turn_gain)
         }
     }
@@ -150,12 +183,30 @@ impl DifferentialDriveLaw {
         r < self.stop_distance || (r < self.sideways_distance && z.abs() < self.stop_distance)
     }
 
+    /// Whether the border has kept the robot from turning to a goal that it could drive to from further back.
+    fn has_to_back(&self, planar: &PlanarPose) -> bool {
+        self.hindered >= HINDERED
+            && self.backings < MOST_BACKINGS
+            && planar.bearing.sin().abs() > OFF_COURSE
+            && planar.distance > self.sideways_distance
+            && !self.is_in_line(planar)
+    }
+
+    /// Whether the robot is behind the goal, or as far back as it may go.
+    fn is_in_line(&self, planar: &PlanarPose) -> bool {
+        let direction = planar.direction();
+        let is_behind = direction.cos() > 0.0 && direction.sin().abs() < IN_LINE;
+        is_behind || planar.distance > self.furthest_back
+    }
+
     fn next_phase(&self, planar: &PlanarPose, at_goal: bool) -> Phase {
         let ahead = planar.bearing.cos();
         let direction = if ahead < 0.0 { -1.0 } else { 1.0 };
         match self.phase {
             Phase::Turning if planar.distance < self.start_distance => Phase::Turning,
+            Phase::Backing if !self.is_in_line(planar) => Phase::Backing,
             _ if at_goal => Phase::Turning,
+            Phase::Driving(_) if self.has_to_back(planar) => Phase::Backing,
             Phase::Driving(s) if ahead.abs() <= SIDEWAYS => Phase::Driving(s),
             _ => Phase::Driving(direction),
         }
@@ -173,7 +224,9 @@ impl ControlLaw for DifferentialDriveLaw {
     fn command(&mut self, pose: &RelativePose) -> Twist {
         let planar = PlanarPose::new(pose);
         let at_goal = self.is_at_goal([pose.t_21.x, pose.t_21.z]);
-        self.phase = self.next_phase(&planar, at_goal);
+        let next = self.next_phase(&planar, at_goal);
+        self.backings += usize::from(next == Phase::Backing && self.phase != Phase::Backing);
+        self.phase = next;
         let PlanarPose { distance: r, bearing, heading } = planar;
         match self.phase {
             Phase::Driving(s) => {
@@ -182,6 +235,10 @@ impl ControlLaw for DifferentialDriveLaw {
                     self.speed_gain * r.tanh() * bearing.cos(),
                     self.turn_gain * s * bearing.sin() * fade,
                 )
+            }
+            Phase::Backing => {
+                let lean = -(2.0 * planar.direction().sin()).clamp(-LEAN, LEAN);
+                Twist::drive(-BACKING_SPEED * self.speed_gain, self.turn_gain * (lean - heading).sin())
             }
             Phase::Start | Phase::Turning => Twist::drive(0.0, -self.turn_gain * heading.sin()),
         }
@@ -205,8 +262,12 @@ impl ControlLaw for DifferentialDriveLaw {
         Twist::drive(if attempt.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.0)
     }
 
+    fn hindered(&mut self, is_hindered: bool) {
+        self.hindered = if is_hindered { self.hindered + 1 } else { 0 };
+    }
+
     fn reset(&mut self) {
-        (self.mean, self.phase) = (None, Phase::Start);
+        (self.mean, self.phase, self.hindered, self.backings) = (None, Phase::Start, 0, 0);
     }
 }
 

@@ -157,3 +157,34 @@ fn the_planar_pose_is_what_the_plant_has() {
     // The goal lies ahead and to the left, seen from the robot's place; it looks further to the left.
     assert!((planar.bearing - ((-0.2_f64).atan2(0.8) + 0.35)).abs() < 1e-15);
 }
+
+/// A border that keeps the robot from turning away from the goal's heading by more than 14° stands for one of its image.
+#[test]
+fn a_robot_that_may_not_turn_away_backs_off_and_arrives() {
+    const FREE: f64 = 0.25;
+    const PERIOD: f64 = 0.1;
+    let limits = crate::servo::Limits { speed: 0.3, turn_rate: 0.5 };
+    let run = |mut robot: DifferentialDrive, furthest_back: f64| {
+        let mut law = DifferentialDriveLaw { furthest_back, ..DifferentialDriveLaw::default() };
+        let mut furthest = 0.0_f64;
+        for _ in 0..1_200 {
+            let mut twist = law.command(&scaled(&robot));
+            let wanted = twist.angular.y;
+            let (least, most) = ((-FREE - robot.heading) / PERIOD, (FREE - robot.heading) / PERIOD);
+            twist.angular.y = wanted.clamp(least.min(0.0), most.max(0.0));
+            law.hindered((twist.angular.y - wanted).abs() > 0.3 * wanted.abs() + 1e-3);
+            robot.advance(&limits.apply(&twist), PERIOD);
+            furthest = furthest.max(robot.x.hypot(robot.z));
+        }
+        (robot, furthest)
+    };
+    for (x, z) in [(0.4, -0.4), (-0.4, -0.4), (0.3, -0.8), (-0.2, -0.3), (0.3, 0.2)] {
+        let start = DifferentialDrive { x, z, heading: 0.0 };
+        let (end, furthest) = run(start, 1.5);
+        assert!(is_home(&end, 0.02), "{start:?}: {end:?}");
+        assert!(furthest < 1.6 * UNIT, "{start:?}: {furthest}");
+    }
+    // Without backing off it ends beside the goal.
+    let start = DifferentialDrive { x: 0.4, z: -0.4, heading: 0.0 };
+    assert!(!is_home(&run(start, 0.0).0, 0.1));
+}
