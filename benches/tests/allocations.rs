@@ -67,7 +67,7 @@ fn no_batch_in_lanes_allocates() {
 
 /// One image of the closed loop: candidates, fit, choice, filter, law, guards.
 #[test]
-fn no_step_of_the_closed_loop_allocates() {
+fn no_step_of_the_filter_s_loop_allocates() {
     use quest_core::servo::{DepthFilter, FreeCameraLaw, Limits, Safety, Servo, scenario};
     let limits = Limits { speed: 0.5, turn_rate: 0.6 };
     let (world, mut camera) = scenario::paper();
@@ -90,5 +90,47 @@ fn no_step_of_the_closed_loop_allocates() {
             std::hint::black_box(servo.step(image));
         });
         assert_eq!(info.count_total, 0, "image {index}");
+    }
+}
+
+/// One image of the closed loop: start, search, poses, map, law, guards. Also where features are lost, wrong and found again.
+#[test]
+fn no_step_of_the_tracker_s_loop_allocates() {
+    use quest_core::servo::{Disturbances, FreeCameraLaw, Limits, Plant, Rig, Safety, Servo, Sticky};
+    use quest_core::servo::{Tracker, scenario};
+    let limits = Limits { speed: 0.5, turn_rate: 0.6 };
+    for (stream, count, share) in [(0, 5, 0.0), (1, 20, 0.1), (2, 200, 0.3)] {
+        let sticky = Some(Sticky { share, images: 20.0 });
+        let disturbances = Disturbances { noise_px: 0.5, sticky, ..Disturbances::default() };
+        let rng = &mut scenario::generator(SEED, stream);
+        let features = scenario::Features::General;
+        let mut world = scenario::robot_world(features, count, disturbances, rng);
+        // All of them in view.
+        world.points.iter_mut().for_each(|x| (x.x, x.y) = (0.6 * x.x, 0.6 * x.y));
+        let mut camera = scenario::robot_start(features);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let tracker = Tracker::new(&goal, SolverName::Quest, world.filter_options(&limits, 2.0));
+        let law = FreeCameraLaw { rate: 0.25, unit: 2.0 };
+        let rig = Rig { unit: 2.0, ..Rig::default() };
+        let mut servo = Servo::new(&goal, tracker, law, Safety::for_robot(limits)).with_rig(rig);
+        let mut images = Vec::new();
+        let mut poses = 0;
+        world.run(&mut camera, &mut servo.clone(), 150, rng, |record| {
+            images.push(record.features.clone());
+            poses += usize::from(record.step.state.has_pose());
+            true
+        });
+        assert!(poses > 80, "{count}: {poses}");
+        assert!(camera.pose().t_21.norm() < 1.0);
+        // Lost for a while, so that the pose is searched for, and one false.
+        images[60..80].iter_mut().for_each(|image| image.rotate_left(1));
+        images[80].fill(None);
+        images[90][2] = Some([0.9, 0.9]);
+        for (index, image) in images.iter().enumerate() {
+            let info = allocation_counter::measure(|| {
+                std::hint::black_box(servo.step(image));
+            });
+            assert_eq!(info.count_total, 0, "{count} features, image {index}");
+        }
     }
 }

@@ -39,13 +39,20 @@ struct Arguments {
     /// Print the indices of lost starts, so many
     #[arg(long, default_value_t = 0)]
     lost: usize,
+    /// Print every image of this start of the laboratory's cells, and no table
+    #[arg(long, requires = "planted")]
+    trace: Option<u64>,
 }
 
 fn main() {
     let arguments = Arguments::parse();
     println!("{} starts a cell, seed {}\n", arguments.starts, arguments.seed);
     if arguments.planted {
-        let Arguments { starts, seed, cell, threads, filter, lost, .. } = &arguments;
+        let Arguments { starts, seed, cell, threads, filter, lost, trace, .. } = &arguments;
+        if let Some(index) = trace {
+            planted::print_trace(*index, *seed, cell, *filter);
+            return;
+        }
         planted::print_table(*starts, *seed, cell, *threads, *filter, *lost);
         return;
     }

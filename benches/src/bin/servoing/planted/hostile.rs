@@ -6,7 +6,7 @@ use quest_benches::parallel;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
     DepthFilter, Disturbances, Estimate, FreeCamera, FreeCameraLaw, HoldReason, Motion, Plant, PoseEstimator,
-    Rig, Safety, Servo, State, Sticky, Tracker, World,
+    Record, Rig, Safety, Servo, State, Sticky, Tracker, World,
 };
 use quest_core::solver::SolverName;
 use rand::RngExt;
@@ -30,17 +30,18 @@ struct Mischief {
 
 /// Whether the camera went further than a tenth beyond its start while tracking, and how many commands were unsafe.
 #[derive(Clone, Copy, Debug)]
-struct Outcome {
+pub(crate) struct Outcome {
     is_wild: bool,
     arrives: bool,
     unsafe_commands: usize,
 }
 
-pub(crate) fn print_table(runs: u64, seed: u64, filter: &str, threads: usize, filtered: bool) {
+pub(crate) fn print_table(runs: u64, seed: u64, filter: &str, threads: usize, filtered: bool, lost: usize) {
     if !"hostile input".contains(filter) {
         return;
     }
-    let Ok(outcomes) = parallel::map(runs, threads, |index| Ok::<_, Infallible>(run(seed, index, filtered)));
+    let Ok(outcomes) =
+        parallel::map(runs, threads, |index| Ok::<_, Infallible>(run(seed, index, filtered, |_| {})));
     let count = |is: &dyn Fn(&Outcome) -> bool| outcomes.iter().filter(|o| is(o)).count();
     println!("\n| hostile input | runs | wild while tracking | arrives all the same | unsafe commands |");
     println!("|---|---:|---:|---:|---:|");
@@ -51,9 +52,13 @@ pub(crate) fn print_table(runs: u64, seed: u64, filter: &str, threads: usize, fi
         count(&|o| o.arrives),
         outcomes.iter().map(|o| o.unsafe_commands).sum::<usize>()
     );
+    let wild = outcomes.iter().enumerate().filter(|(_, o)| o.is_wild);
+    for (index, outcome) in wild.take(lost) {
+        println!("  {index}: {outcome:?}");
+    }
 }
 
-fn run(seed: u64, index: u64, filtered: bool) -> Outcome {
+pub(crate) fn run(seed: u64, index: u64, filtered: bool, watch: impl FnMut(&Record)) -> Outcome {
     let rng = &mut scenario::generator(seed ^ 0x4057, index);
     let count = [6, 8, 12, 20, 40][rng.random_range(0..5)];
     // A plane has a twin.
@@ -85,6 +90,7 @@ fn run(seed: u64, index: u64, filtered: bool) -> Outcome {
             camera,
             Servo::new(&goal, Mangled::new(filter, mischief, own), law, safety).with_rig(rig),
             rng,
+            watch,
         );
     }
     let tracker = Tracker::new(&goal, SolverName::Quest, options);
@@ -93,6 +99,7 @@ fn run(seed: u64, index: u64, filtered: bool) -> Outcome {
         camera,
         Servo::new(&goal, Mangled::new(tracker, mischief, own), law, safety).with_rig(rig),
         rng,
+        watch,
     )
 }
 
@@ -101,10 +108,12 @@ fn drive<E: PoseEstimator>(
     mut camera: FreeCamera,
     mut servo: Servo<Mangled<E>, FreeCameraLaw>,
     rng: &mut ChaCha8Rng,
+    mut watch: impl FnMut(&Record),
 ) -> Outcome {
     let begin = camera.pose().t_21.norm();
     let mut outcome = Outcome { is_wild: false, arrives: false, unsafe_commands: 0 };
     world.run(&mut camera, &mut servo, IMAGES, rng, |record| {
+        watch(record);
         let command = &record.step.command;
         let is_safe = command.is_finite()
             && command.linear.norm() <= LIMITS.speed * (1.0 + 1e-12)

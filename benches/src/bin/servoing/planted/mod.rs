@@ -10,6 +10,8 @@ use std::convert::Infallible;
 
 use quest_benches::parallel;
 use quest_benches::statistics::{percentile, sorted};
+use quest_core::RelativePose;
+use quest_core::servo::{Record, Step};
 
 use cells::cells;
 use run::Outcome;
@@ -30,7 +32,49 @@ pub(crate) fn print_table(starts: u64, seed: u64, filter: &str, threads: usize, 
             println!("  {index}: {outcome:?}");
         }
     }
-    hostile::print_table(starts.min(1_000), seed, filter, threads, filtered);
+    hostile::print_table(starts.min(1_000), seed, filter, threads, filtered, lost);
+}
+
+/// Prints every image of one run of the cells whose name contains `filter`.
+pub(crate) fn print_trace(index: u64, seed: u64, filter: &str, filtered: bool) {
+    for cell in cells().iter().filter(|cell| cell.name.contains(filter)) {
+        println!("{}, start {index}", cell.name);
+        let outcome = run::run_watched(cell, seed, index, filtered, |record| println!("{}", line(record)));
+        println!("{outcome:?}");
+    }
+    if "hostile input".contains(filter) {
+        println!("hostile input, start {index}");
+        let outcome = hostile::run(seed, index, filtered, |record| println!("{}", line(record)));
+        println!("{outcome:?}");
+    }
+}
+
+/// An image in one line: the true pose, the estimated one, the command.
+fn line(record: &Record) -> String {
+    let Step { command, estimate, state, status } = &record.step;
+    let cm =
+        |t: nalgebra::Vector3<f64>| format!("({:.1} {:.1} {:.1})", 100.0 * t.x, 100.0 * t.y, 100.0 * t.z);
+    let degrees = |pose: &RelativePose| pose.q_21.angle().to_degrees();
+    let estimated = estimate.as_ref().map_or(String::new(), |e| {
+        format!(
+            "estimate {} cm {:.1}°, {} alive",
+            cm(e.pose.t_21 * scenes::UNIT),
+            degrees(&e.pose),
+            e.alternatives
+        )
+    });
+    format!(
+        "{:4} {:13} truth {} cm {:.1}° {estimated}, {} of {}, command {} cm/s {:.1}°/s{}",
+        status.images,
+        state.name(),
+        cm(record.truth.t_21),
+        degrees(&record.truth),
+        status.inliers,
+        status.seen,
+        cm(command.linear),
+        command.angular.norm().to_degrees(),
+        if status.border_limits { ", border" } else { "" },
+    )
 }
 
 fn print_row(name: &str, outcomes: &[Outcome]) {

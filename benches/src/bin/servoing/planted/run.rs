@@ -3,8 +3,8 @@
 use quest_core::RelativePose;
 use quest_core::servo::scenario;
 use quest_core::servo::{
-    ControlLaw, DepthFilter, DifferentialDriveLaw, FilterOptions, FreeCameraLaw, Plane, PoseEstimator, Rig,
-    Safety, Servo, State, Tracker, World,
+    ControlLaw, DepthFilter, DifferentialDriveLaw, FilterOptions, FreeCameraLaw, Plane, PoseEstimator,
+    Record, Rig, Safety, Servo, State, Tracker, World,
 };
 use quest_core::solver::SolverName;
 use rand_chacha::ChaCha8Rng;
@@ -50,55 +50,83 @@ impl Outcome {
     }
 }
 
+/// What a loop is built from.
+struct Setup<'a> {
+    cell: &'a Cell,
+    world: &'a World,
+    goal: &'a [[f64; 2]],
+    options: FilterOptions,
+    safety: Safety,
+    rig: Rig,
+    /// With the filter in place of the tracker.
+    filtered: bool,
+}
+
 /// Runs the loop of a cell with what the wheel does by default.
 pub(crate) fn run(cell: &Cell, seed: u64, index: u64, filtered: bool) -> Outcome {
+    run_watched(cell, seed, index, filtered, |_| {})
+}
+
+/// The same; `watch` sees every image.
+pub(crate) fn run_watched(
+    cell: &Cell,
+    seed: u64,
+    index: u64,
+    filtered: bool,
+    watch: impl FnMut(&Record),
+) -> Outcome {
     let rng = &mut scenario::generator(seed, index);
     let (world, body) = scenes::draw(cell, rng);
     let goal = world.on_plane(&world.goal_pixels(rng));
-    let mut safety = Safety { explore: cell.explore, ..Safety::for_robot(LIMITS) };
-    let mut rig = Rig { unit: UNIT, ..Rig::default() };
-    let mut options = world.filter_options(&LIMITS, UNIT);
+    let options = world.filter_options(&LIMITS, UNIT);
     let (position, angle) = bound::error(&bound::resection(&world, &goal, &options, UNIT));
+    let mut setup = Setup {
+        cell,
+        world: &world,
+        goal: &goal,
+        options,
+        safety: Safety { explore: cell.explore, ..Safety::for_robot(LIMITS) },
+        rig: Rig { unit: UNIT, ..Rig::default() },
+        filtered,
+    };
     let outcome = match body {
         Body::Camera(_) => {
             let law = FreeCameraLaw { rate: 0.5, unit: UNIT };
-            start(cell, &world, body, (&goal, options, safety, rig), law, filtered, rng)
+            start(&setup, body, law, rng, watch)
         }
         Body::Robot(_, mount) => {
-            safety.border = world.border(BORDER);
-            rig.mount = mount;
+            setup.safety.border = world.border(BORDER);
+            setup.rig.mount = mount;
             let base = mount.pose();
-            options.plane = Some(PLANE);
-            options.base = RelativePose::new(base.q_21, base.t_21 / UNIT);
-            let law = DifferentialDriveLaw::default();
-            start(cell, &world, body, (&goal, options, safety, rig), law, filtered, rng)
+            setup.options.plane = Some(PLANE);
+            setup.options.base = RelativePose::new(base.q_21, base.t_21 / UNIT);
+            start(&setup, body, DifferentialDriveLaw::default(), rng, watch)
         }
     };
     Outcome { resection_arrives: position < 0.02 && angle < 1.0, ..outcome }
 }
 
 fn start<L: ControlLaw>(
-    cell: &Cell,
-    world: &World,
+    setup: &Setup<'_>,
     body: Body,
-    (goal, options, safety, rig): (&[[f64; 2]], FilterOptions, Safety, Rig),
     law: L,
-    filtered: bool,
     rng: &mut ChaCha8Rng,
+    watch: impl FnMut(&Record),
 ) -> Outcome {
+    let Setup { cell, world, goal, options, safety, rig, filtered } = *setup;
     let depths: Vec<f64> = world.points.iter().map(|x| x.z).collect();
     if filtered {
         let mut filter = DepthFilter::new(goal, SolverName::Quest, options);
         if cell.known_depths {
             filter.set_depths(&depths, 0.02);
         }
-        return drive(cell, world, body, Servo::new(goal, filter, law, safety).with_rig(rig), rng);
+        return drive(cell, world, body, Servo::new(goal, filter, law, safety).with_rig(rig), rng, watch);
     }
     let mut tracker = Tracker::new(goal, SolverName::Quest, options);
     if cell.known_depths {
         tracker.set_depths(&depths, 0.02);
     }
-    drive(cell, world, body, Servo::new(goal, tracker, law, safety).with_rig(rig), rng)
+    drive(cell, world, body, Servo::new(goal, tracker, law, safety).with_rig(rig), rng, watch)
 }
 
 fn drive<E: PoseEstimator, L: ControlLaw>(
@@ -107,6 +135,7 @@ fn drive<E: PoseEstimator, L: ControlLaw>(
     mut body: Body,
     mut servo: Servo<E, L>,
     rng: &mut ChaCha8Rng,
+    mut watch: impl FnMut(&Record),
 ) -> Outcome {
     let begin = body.off().0;
     let mut outcome = Outcome {
@@ -124,6 +153,7 @@ fn drive<E: PoseEstimator, L: ControlLaw>(
     let (mut still, mut last) = (0, nalgebra::Vector3::zeros());
     let may = cell.explore * UNIT;
     world.run(&mut body, &mut servo, IMAGES, rng, |record| {
+        watch(record);
         let step = &record.step;
         let is_safe = step.command.is_finite()
             && step.command.linear.norm() <= LIMITS.speed * (1.0 + 1e-12)

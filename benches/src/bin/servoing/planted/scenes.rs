@@ -15,6 +15,8 @@ pub(crate) const LIMITS: Limits = Limits { speed: 0.3, turn_rate: 0.5 };
 /// About how far the features are, in metres.
 pub(crate) const UNIT: f64 = 2.0;
 const NOISE_PX: f64 = 0.5;
+/// Turned away the camera may see too few features to begin with: starts with fewer than this are left out.
+const SEEN: usize = 8;
 
 /// What moves.
 #[derive(Clone, Copy, Debug)]
@@ -84,20 +86,16 @@ pub(crate) fn draw(cell: &Cell, rng: &mut ChaCha8Rng) -> (World, Body) {
         period: 0.1,
     };
     match cell.place {
-        Place::Beside { metres, degrees } => {
-            // Turned sideways the camera may see too few of them to begin with.
-            const SEEN: usize = 8;
-            loop {
-                let world = world(wide_points(cell, rng), camera(800.0, 1280, 960));
-                let axis = Unit::new_normalize(unit_vector(rng).component_mul(&Vector3::new(0.3, 0.3, 1.0)));
-                let angle = rng.random_range(0.0..=degrees).to_radians();
-                let turn = UnitQuaternion::from_axis_angle(&axis, angle);
-                let start = RelativePose::new(turn, unit_vector(rng) * metres);
-                if world.seen_from(&start) >= SEEN {
-                    return (world, Body::Camera(FreeCamera::new(start)));
-                }
+        Place::Beside { metres, degrees } => loop {
+            let world = world(wide_points(cell, rng), camera(800.0, 1280, 960));
+            let axis = Unit::new_normalize(unit_vector(rng).component_mul(&Vector3::new(0.3, 0.3, 1.0)));
+            let angle = rng.random_range(0.0..=degrees).to_radians();
+            let turn = UnitQuaternion::from_axis_angle(&axis, angle);
+            let start = RelativePose::new(turn, unit_vector(rng) * metres);
+            if world.seen_from(&start) >= SEEN {
+                return (world, Body::Camera(FreeCamera::new(start)));
             }
-        }
+        },
         Place::Arm => arm(cell, &disturbances, rng),
         Place::Tag { size } => tag(world(tag_points(cell.count, size, rng), camera(510.0, 640, 480)), rng),
         Place::Robot { spread } => {
@@ -106,8 +104,14 @@ pub(crate) fn draw(cell: &Cell, rng: &mut ChaCha8Rng) -> (World, Body) {
                 let z = rng.random_range(1.5..2.5);
                 Vector3::new(rng.random_range(-half..half) * z, rng.random_range(-0.35..0.35) * z, z)
             };
-            let points = (0..cell.count).map(|_| point(rng)).collect();
-            (world(points, camera(510.0, 640, 480)), Body::Robot(scenario::random_robot(rng), Mount::Camera))
+            loop {
+                let points = (0..cell.count).map(|_| point(rng)).collect();
+                let world = world(points, camera(510.0, 640, 480));
+                let start = Body::Robot(scenario::random_robot(rng), Mount::Camera);
+                if world.seen_from(&start.pose()) >= SEEN {
+                    return (world, start);
+                }
+            }
         }
         Place::Mounted { forward, degrees } => {
             let mount = Mount::ahead(forward, 0.3, degrees.to_radians());
