@@ -38,7 +38,7 @@ goal = see(0, 0, 0)
 robot = RobotServo(goal, camera, max_speed=0.3, max_turn_rate=0.5, noise=0.5, period=PERIOD, unit=2.0)
 for _ in range(600):
     command = robot.step(see(x, z, heading))
-    if command.state != "tracking":
+    if command.state not in ("tracking", "confirming"):
         print("holding:", command.state)
     drive(command.speed, command.turn_rate)
 

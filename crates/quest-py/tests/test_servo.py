@@ -155,9 +155,9 @@ def test_commands_are_values() -> None:
 
 def test_stale_images_stop() -> None:
     loop = servo.CameraServo(GOAL, **LIMITS, noise=1e-3, depths=FEATURES[:, 2], max_acceleration=np.inf)
-    # The first image finds the pose, the second one follows it.
+    # The first image finds the pose, the second one follows it, slowly until the camera is seen to move.
     assert loop.step(GOOD, stamp=9.9).state == "starting"
-    assert loop.step(GOOD, stamp=10.0).state == "tracking"
+    assert loop.step(GOOD, stamp=10.0).state == "confirming"
     moving = loop.step(GOOD, stamp=10.1)
     assert moving.linear.any()
     assert loop.idle(10.3)[0].any()
@@ -165,7 +165,7 @@ def test_stale_images_stop() -> None:
     for stamp, now in ((10.1, 10.1), (10.0, 10.0), (10.2, 11.0), (np.nan, 0.0)):
         command = loop.step(GOOD, stamp=stamp, now=now)
         assert command.state == "stale" and not command.linear.any()
-    assert loop.step(GOOD, stamp=11.0).state == "tracking"
+    assert loop.step(GOOD, stamp=11.0).state == "confirming"
 
 
 def test_depths_go_out_and_in() -> None:
@@ -181,7 +181,7 @@ def test_depths_go_out_and_in() -> None:
     other = servo.CameraServo(GOAL, **LIMITS, noise=1e-4, unit=2.0)
     other.set_depths(np.where(np.arange(6) == 5, np.nan, depths), precision)
     # Five known depths of six: the sixth is no reason to wait.
-    assert other.step(image(R, t)).state in ("tracking", "starting")
+    assert other.step(image(R, t)).state in ("tracking", "confirming", "starting")
 
 
 def test_axes_and_mounts() -> None:
@@ -201,7 +201,7 @@ def test_axes_and_mounts() -> None:
     with pytest.raises(qp.QuestError, match="rigid"):
         servo.CameraServo(GOAL, **options, camera_in_hand=2 * np.eye(4))
     robot = servo.RobotServo(GOAL, **options, camera_in_base=(0.2, 0.5, 0.1), turn_gain=2.0)
-    assert robot.step(GOOD).state in ("tracking", "starting")
+    assert robot.step(GOOD).state in ("tracking", "confirming", "starting")
 
 
 @pytest.mark.parametrize(
