@@ -13,17 +13,15 @@ for line in open(sys.argv[1]):
     run = json.loads(line)
     cells[run["scene"], run["front"]].setdefault(run["method"], {})[run["start"]] = run
 
-print("| scene, features | starts |", " | ".join(NAMES), "| cm, median | ms a step, median |")
-print("|---|---:|" + "---:|" * (len(NAMES) + 2))
+print("| scene, features |", " | ".join(NAMES), "| cm, median | °, median | ms a step, median |")
+print("|---|" + "---:|" * (len(NAMES) + 3))
 for (scene, front), methods in cells.items():
-    starts = set.intersection(*(set(runs) for runs in methods.values()))
-    counts = [
-        f"{sum(methods[m][s]['outcome'] == 'arrived' for s in starts)}" if m in methods else "–" for m in NAMES
-    ]
-    ours = [methods["servo"][s] for s in starts if "servo" in methods]
-    cm = f"{np.median([r['cm'] for r in ours]):.2f}" if ours else "–"
-    ms = f"{np.median([r['ms'] for r in ours]):.2f}" if ours else "–"
-    print(f"| {scene}, {front} | {len(starts)} |", " | ".join(counts), f"| {cm} | {ms} |")
+    # All of a method's runs: the starts of a method with fewer of them are among the others'.
+    arrived = {m: sum(r["outcome"] == "arrived" for r in runs.values()) for m, runs in methods.items()}
+    counts = [f"{arrived[m]} of {len(methods[m])}" if m in methods else "–" for m in NAMES]
+    ours = list(methods.get("servo", {}).values())
+    medians = [f"{np.median([r[key] for r in ours]):.2f}" if ours else "–" for key in ("cm", "deg", "ms")]
+    print(f"| {scene}, {front} |", " | ".join(counts + medians), "|")
 print()
 for (scene, front), methods in cells.items():
     for name, runs in methods.items():
