@@ -34,7 +34,7 @@
 //! |---|---|---|
 //! | [`Servo`] | one image in, one command out: estimator, law, guards, limits | here |
 //! | [`ControlLaw`] | [`FreeCameraLaw`] (section 10.1), [`DifferentialDriveLaw`] (appendix C), their stability | [`free_camera`], [`differential_drive`] |
-//! | [`PoseEstimator`] | [`DepthFilter`], which keeps the goal's depths; [`PerFrame`], which chooses anew as the paper does | [`depth_filter`], [`per_frame`] |
+//! | [`PoseEstimator`] | [`Tracker`], which keeps a map of any number of features; [`DepthFilter`], which keeps the goal's depths; [`PerFrame`], which chooses anew as the paper does | [`tracker`], [`depth_filter`], [`per_frame`] |
 //! | [`PoseSource`] | where candidates come from: a solver, or anything else | |
 //! | [`Plant`] | [`FreeCamera`], [`DifferentialDrive`] | [`plant`] |
 //! | [`World`] | the simulated loop, its images and their disturbances | [`closed_loop`], [`scenario`] |
