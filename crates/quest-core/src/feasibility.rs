@@ -1,8 +1,61 @@
 //! Which poses a real pair of cameras can have: positive depths, and theorem 2 of the paper's appendix B.
 
-use nalgebra::{Vector2, Vector3};
+use std::str::FromStr;
 
-use crate::{Correspondence, RelativePose};
+use nalgebra::{UnitQuaternion, Vector2};
+
+use crate::{Candidate, Correspondence, RelativePose};
+
+/// Which test decides whether a candidate is feasible.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Feasibility {
+    /// Every match has positive depth in both views, as [`Candidate::in_front`] counts them: exact.
+    #[default]
+    PositiveDepth,
+    /// Theorem 2 of appendix B, [`theorem_2`]. It keeps fewer candidates, and none of cameras that look back at the points from
+    /// their far side.
+    Theorem2,
+}
+
+impl Feasibility {
+    /// Every choice, the default first.
+    pub const CHOICES: [Self; 2] = [Self::PositiveDepth, Self::Theorem2];
+
+    /// The name on the command line, in Python and in files: `positive-depth`, `theorem-2`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PositiveDepth => "positive-depth",
+            Self::Theorem2 => "theorem-2",
+        }
+    }
+
+    /// Whether a candidate for these matches is feasible.
+    #[must_use]
+    pub fn accepts(self, candidate: &Candidate, matches: &[Correspondence]) -> bool {
+        match self {
+            Self::PositiveDepth => candidate.in_front == matches.len(),
+            Self::Theorem2 => theorem_2(&candidate.pose, matches),
+        }
+    }
+}
+
+/// No test of feasibility has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("feasibility is {found:?}, expected one of {}", Feasibility::CHOICES.map(Feasibility::name).join(", "))]
+pub struct UnknownFeasibility {
+    /// The name that was asked for.
+    pub found: String,
+}
+
+impl FromStr for Feasibility {
+    type Err = UnknownFeasibility;
+
+    fn from_str(name: &str) -> Result<Self, UnknownFeasibility> {
+        let found = Self::CHOICES.into_iter().find(|choice| choice.name() == name);
+        found.ok_or_else(|| UnknownFeasibility { found: name.to_owned() })
+    }
+}
 
 /// How many matches have positive depth in both views: the exact test, and the default.
 ///
@@ -23,31 +76,84 @@ pub fn in_front(pose: &RelativePose, matches: &[Correspondence]) -> usize {
 /// a camera that looks back at the points from their far side. [`in_front`] is the exact test.
 #[must_use]
 pub fn theorem_2(pose: &RelativePose, matches: &[Correspondence]) -> bool {
-    let to_frame_1 = pose.q_21.inverse();
-    let t_xy = (to_frame_1 * pose.t_21).xy();
-    matches.iter().all(|m| {
-        let s2 = to_frame_1 * m.bearing2();
-        s2.z > 0.0 && moves_along(&t_xy, m.bearing1(), &s2)
-    })
+    let compared = Compared::new(pose);
+    matches.iter().all(|m| compared.verdict(m).is_feasible())
 }
 
-/// Conditions (b) and (c): seen from above, the point moves from `s2` to `s1` away from `t_xy`, on its side.
-fn moves_along(t_xy: &Vector2<f64>, s1: &Vector3<f64>, s2: &Vector3<f64>) -> bool {
-    // Rounding of unit vectors: equality must not be lost where a point does not move.
-    const SLACK: f64 = 1e-12;
-    let (v1, v2) = (s1.xy(), s2.xy());
-    let (side1, side2) = (t_xy.perp(&v1), t_xy.perp(&v2));
-    let angle1 = side1.abs().atan2(t_xy.dot(&v1));
-    let angle2 = side2.abs().atan2(t_xy.dot(&v2));
-    let rounding = SLACK * t_xy.norm();
-    let same_side = side1.signum() == side2.signum() || side1.abs() <= rounding || side2.abs() <= rounding;
-    angle2 <= angle1 + SLACK / v1.norm().min(v2.norm()).max(SLACK) && same_side
+/// The conditions of [`theorem_2`], each over all matches.
+#[must_use]
+pub fn verdict(pose: &RelativePose, matches: &[Correspondence]) -> Verdict {
+    let compared = Compared::new(pose);
+    matches.iter().map(|m| compared.verdict(m)).fold(Verdict::FEASIBLE, Verdict::and)
+}
+
+/// What theorem 2 says of a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Verdict {
+    /// (a): the points that view 2 sees lie ahead of camera 1 too, `2z̃ > 0`.
+    pub is_ahead: bool,
+    /// (b): in the image plane of camera 1 the points are turned away from `t_xy` at least as far in view 1 as in view 2.
+    pub turns_away: bool,
+    /// (c): on the same side of it.
+    pub stays_on_its_side: bool,
+}
+
+impl Verdict {
+    const FEASIBLE: Self = Self { is_ahead: true, turns_away: true, stays_on_its_side: true };
+
+    /// Whether all three conditions hold.
+    #[must_use]
+    pub fn is_feasible(&self) -> bool {
+        self.is_ahead && self.turns_away && self.stays_on_its_side
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            is_ahead: self.is_ahead && other.is_ahead,
+            turns_away: self.turns_away && other.turns_away,
+            stays_on_its_side: self.stays_on_its_side && other.stays_on_its_side,
+        }
+    }
+}
+
+/// What does not depend on the match.
+struct Compared {
+    to_frame_1: UnitQuaternion<f64>,
+    t_xy: Vector2<f64>,
+}
+
+impl Compared {
+    fn new(pose: &RelativePose) -> Self {
+        let to_frame_1 = pose.q_21.inverse();
+        Self { to_frame_1, t_xy: (to_frame_1 * pose.t_21).xy() }
+    }
+
+    fn verdict(&self, m: &Correspondence) -> Verdict {
+        // Rounding of unit vectors: equality must not be lost where a point does not move.
+        const SLACK: f64 = 1e-12;
+        let s2 = self.to_frame_1 * m.bearing2();
+        let (v1, v2, t_xy) = (m.bearing1().xy(), s2.xy(), &self.t_xy);
+        let (side1, side2) = (t_xy.perp(&v1), t_xy.perp(&v2));
+        let angle1 = side1.abs().atan2(t_xy.dot(&v1));
+        let angle2 = side2.abs().atan2(t_xy.dot(&v2));
+        let rounding = SLACK * t_xy.norm();
+        Verdict {
+            is_ahead: s2.z > 0.0,
+            turns_away: angle2 <= angle1 + SLACK / v1.norm().min(v2.norm()).max(SLACK),
+            stays_on_its_side: side1.signum() == side2.signum()
+                || side1.abs() <= rounding
+                || side2.abs() <= rounding,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::UnitQuaternion;
+    use crate::Candidates;
+    use crate::simulate::{Scene, SceneOptions};
+    use crate::solver::{Kinds, PoseSolver, Quest};
+    use nalgebra::Vector3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -90,6 +196,41 @@ mod tests {
             assert_eq!(in_front(&reversed, &matches), 0, "scene {k}");
             assert!(!theorem_2(&reversed, &matches), "scene {k}");
         }
+    }
+
+    #[test]
+    fn theorem_2_keeps_fewer_candidates_and_not_one_true_pose_less() {
+        const SCENES: u64 = 1_000;
+        let (mut kept, mut true_ones, mut all) = ([0; 2], [0; 2], 0);
+        for index in 0..SCENES {
+            let scene = Scene::generate(&SceneOptions::realistic(), 10_002, index).unwrap();
+            let mut found = Candidates::new();
+            Quest { kinds: Kinds::Exact }.solve(&scene.matches, &mut found);
+            all += found.len();
+            for (k, test) in Feasibility::CHOICES.into_iter().enumerate() {
+                let feasible: Vec<_> = found.iter().filter(|c| test.accepts(c, &scene.matches)).collect();
+                kept[k] += feasible.len();
+                let is_true = |c: &&Candidate| {
+                    c.pose.rotation_error(&scene.truth) < 1e-6
+                        && (c.pose.t_21 - scene.truth.t_21).norm() < 1e-5
+                };
+                true_ones[k] += usize::from(feasible.iter().any(is_true));
+            }
+        }
+        let mean = |count: usize| count as f64 / SCENES as f64;
+        assert_eq!(true_ones, [1_000; 2]);
+        // Counts: only rounding at the edge of a condition may change one of them.
+        assert!((mean(all) - 9.708).abs() < 0.02, "{}", mean(all));
+        assert!((mean(kept[0]) - 3.076).abs() < 0.01 && (mean(kept[1]) - 2.292).abs() < 0.01, "{kept:?}");
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for choice in Feasibility::CHOICES {
+            assert_eq!(choice.name().parse(), Ok(choice));
+        }
+        let error = "theorem-3".parse::<Feasibility>().unwrap_err().to_string();
+        assert_eq!(error, "feasibility is \"theorem-3\", expected one of positive-depth, theorem-2");
     }
 
     #[test]

@@ -35,10 +35,10 @@ pub(crate) fn bad_input_has_its_reason(subject: &Subject) {
 pub(crate) fn coarse_points_give_finite_candidates(subject: &Subject) {
     let least = subject.solver.info().min_matches;
     let mut rng = ChaCha8Rng::seed_from_u64(SEED_DEGENERATE + 2);
-    for round in 0..20_000 {
+    for round in 0..subject.share(20_000) {
         let size = if round % 2 == 0 { 1 } else { 3 };
         let mut coordinate = || f64::from(rng.random_range(-size..=size)) * 0.25;
-        let matches: Vec<_> = (0..least + round % 5)
+        let matches: Vec<_> = (0..least + usize::try_from(round % 5).unwrap())
             .map(|_| [coordinate(), coordinate(), coordinate(), coordinate()])
             .map(|[u1, v1, u2, v2]| Correspondence::from_image_points([u1, v1], [u2, v2]).unwrap())
             .collect();
@@ -57,7 +57,7 @@ pub(crate) fn pure_rotations_are_named(subject: &Subject) {
     let [_, realistic] = subject.views();
     for points in [realistic.points, 100] {
         let options = SceneOptions { motion: Motion::PureRotation, points, ..realistic };
-        for one in scenes(options, SEED_DEGENERATE + 1, 100) {
+        for one in scenes(options, SEED_DEGENERATE + 1, subject.share(100)) {
             let found = subject.solve(Kinds::Exact, &one.matches);
             assert_eq!(found.degeneracy(), Some(Degeneracy::PureRotation));
             assert_eq!(found.len(), 1);

@@ -13,22 +13,27 @@ use super::{
 };
 
 pub(crate) fn exact_candidates_are_the_real_solutions_of_section_7_1(subject: &Subject) {
-    let mut solutions = 0;
+    let (mut solutions, count) = (0, subject.share(500));
     for options in subject.views() {
-        for (index, scene) in scenes(noisy(options), SEED_LITERAL, 500).enumerate() {
+        let mut different = Vec::new();
+        for (index, scene) in scenes(noisy(options), SEED_LITERAL, count).enumerate() {
             let expected = literal(&five_bearings(&scene.matches)).real;
             let found = rotations(&subject.exact(&scene.matches));
-            assert!(same_rotations(&found, &expected), "{:?}, scene {index}", options.view);
-            solutions += found.len();
+            if !same_rotations(&found, &expected) {
+                different.push(index);
+            }
+            solutions += found.len() as u64;
         }
+        let most = subject.missed.solution_sets;
+        assert!(different.len() <= most, "{:?}: {} {different:?}", options.view, different.len());
     }
     // About nine real solutions a problem.
-    assert!(solutions > 8_000, "{solutions}");
+    assert!(solutions > 16 * count, "{solutions}");
 }
 
 pub(crate) fn exact_candidates_satisfy_the_quartics(subject: &Subject) {
     for options in subject.views() {
-        for scene in scenes(noisy(options), SEED_LITERAL + 1, 200) {
+        for scene in scenes(noisy(options), SEED_LITERAL + 1, subject.share(200)) {
             let quartics = quest_tests::quartics::quartics(&five_bearings(&scene.matches));
             for q in rotations(&subject.exact(&scene.matches)) {
                 let worst = quartics.iter().map(|p| p.evaluate(constant(q)).norm()).fold(0.0, f64::max);
@@ -41,21 +46,24 @@ pub(crate) fn exact_candidates_satisfy_the_quartics(subject: &Subject) {
 pub(crate) fn exact_candidates_fit_to_rounding(subject: &Subject) {
     for layout in [Layout::General, Layout::Coplanar] {
         for options in subject.views() {
-            for scene in scenes(SceneOptions { layout, ..noisy(options) }, SEED_LITERAL + 3, 500) {
+            let mut unanswered = 0;
+            let options = SceneOptions { layout, ..noisy(options) };
+            for scene in scenes(options, SEED_LITERAL + 3, subject.share(500)) {
                 let found = subject.solve(Kinds::Exact, &scene.matches);
-                assert!(!found.is_empty());
+                unanswered += usize::from(found.is_empty());
                 for candidate in found.iter() {
                     assert!(candidate.residual < 1e-9, "{:e}", candidate.residual);
                     assert!((candidate.pose.r_21().determinant() - 1.0).abs() < 1e-14);
                 }
             }
+            assert!(unanswered <= subject.missed.unanswered, "{layout:?}, {:?}: {unanswered}", options.view);
         }
     }
 }
 
 pub(crate) fn candidates_are_finite_and_ranked(subject: &Subject) {
     let info = subject.solver.info();
-    for scene in scenes(noisy(subject.scenes), SEED_NOISY, 500) {
+    for scene in scenes(noisy(subject.scenes), SEED_NOISY, subject.share(500)) {
         let [all, exact] = [Kinds::All, Kinds::Exact].map(|kinds| subject.solve(kinds, &scene.matches));
         assert_eq!(all.degeneracy(), None);
         assert!(all.len() <= info.max_candidates);
@@ -83,14 +91,14 @@ pub(crate) fn a_used_list_is_emptied_first(subject: &Subject) {
 
 pub(crate) fn points_in_front_are_counted(subject: &Subject) {
     let [everywhere, realistic] = subject.views();
-    for scene in scenes(realistic, SEED_PLANTED + 2, 300) {
+    for scene in scenes(realistic, SEED_PLANTED + 2, subject.share(300)) {
         let found = subject.solve(Kinds::Exact, &scene.matches);
         let best = closest(&found, &scene.truth).unwrap();
         assert_eq!(best.in_front, scene.matches.len());
         assert!((best.pose.t_21 - scene.truth.t_21).norm() < 1e-5);
     }
     // Where points lie behind camera 2, the sign of t is the one with more points in front.
-    for scene in scenes(everywhere, SEED_PLANTED + 2, 300) {
+    for scene in scenes(everywhere, SEED_PLANTED + 2, subject.share(300)) {
         let found = subject.solve(Kinds::Exact, &scene.matches);
         let best = closest(&found, &scene.truth).unwrap();
         let front = scene.points2().filter(|x2| x2.z > 0.0).count();
@@ -103,13 +111,13 @@ pub(crate) fn points_in_front_are_counted(subject: &Subject) {
 pub(crate) fn noise_moves_the_pose_a_little(subject: &Subject) {
     let [_, realistic] = subject.views();
     let options = SceneOptions { noise_px: 0.1, points: 20, ..realistic };
-    let mut errors: Vec<f64> = scenes(options, SEED_NOISY + 2, 300)
+    let mut errors: Vec<f64> = scenes(options, SEED_NOISY + 2, subject.share(300))
         .map(|one| {
             let found = subject.solve(Kinds::All, &one.matches);
             found.iter().map(|c| c.pose.rotation_error(&one.truth)).fold(f64::INFINITY, f64::min)
         })
         .collect();
     errors.sort_by(f64::total_cmp);
-    // 0.1 px are 0.1 mrad; linear estimates of twenty points magnify them by some ten.
-    assert!(errors[150] < 5e-3, "{:e}", errors[150]);
+    let median = errors[errors.len() / 2];
+    assert!(median < subject.missed.median_of_twenty, "{median:e}");
 }

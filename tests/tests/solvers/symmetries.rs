@@ -21,9 +21,9 @@ fn mapped(
     matches.iter().map(one).collect()
 }
 
-/// Counts the noisy problems, of 1,000, of which a law does not hold.
+/// Counts the noisy problems, of its share of 1,000, of which a law does not hold.
 fn holds(subject: &Subject, seed: u64, law: impl Fn(&Scene) -> bool) {
-    let all = scenes(noisy(subject.scenes), seed, 1_000).enumerate();
+    let all = scenes(noisy(subject.scenes), seed, subject.share(1_000)).enumerate();
     let broken: Vec<_> = all.filter(|(_, scene)| !law(scene)).map(|(index, _)| index).collect();
     assert!(broken.len() <= subject.most_different, "{}: {broken:?}", broken.len());
 }

@@ -24,7 +24,7 @@ pub use constraint::{constraint_matrix, constraint_matrix_5};
 #[cfg(feature = "faer")]
 pub(crate) use minors::minor_with_q;
 pub(crate) use minors::{minors_with_q, minors_without_q};
-pub use monomials::MONOMIALS;
+pub use monomials::{MONOMIALS, NORM_ROW, monomial_names};
 
 /// `M` for the 3 × 3 matrix `y = b aᵀ`, or a sum of such: with `q = (q1, q_v)`, `M q = b ⊗ q ⊗ a`.
 ///

@@ -6,6 +6,33 @@ use crate::algebra::monomials::{homogeneous, position, sum};
 /// `q1⁴, q1³q2, q1³q3, …, q4⁴`.
 pub const MONOMIALS: [[u8; 4]; 35] = homogeneous::<35>(4);
 
+/// The row (40) of `C`: the coefficients of `(q·q)²` over [`MONOMIALS`], which a unit quaternion makes 1.
+pub const NORM_ROW: [f64; 35] = {
+    let mut row = [0.0; 35];
+    let mut k = 0;
+    while k < 35 {
+        let [a, b, c, d] = MONOMIALS[k];
+        if a % 2 == 0 && b % 2 == 0 && c % 2 == 0 && d % 2 == 0 {
+            row[k] = if a == 4 || b == 4 || c == 4 || d == 4 { 1.0 } else { 2.0 };
+        }
+        k += 1;
+    }
+    row
+};
+
+/// The names of [`MONOMIALS`]: `q1^4`, `q1^3 q2`, …, `q4^4`.
+#[must_use]
+pub fn monomial_names() -> [String; 35] {
+    MONOMIALS.map(|exponents| {
+        let factors = exponents.into_iter().enumerate().filter(|(_, e)| *e > 0);
+        let factors = factors.map(|(k, e)| match e {
+            1 => format!("q{}", k + 1),
+            e => format!("q{}^{e}", k + 1),
+        });
+        factors.collect::<Vec<_>>().join(" ")
+    })
+}
+
 /// Exponents of the ten quadratic monomials in the same order.
 pub(crate) const QUADRATIC: [[u8; 4]; 10] = homogeneous::<10>(2);
 
@@ -73,6 +100,16 @@ mod tests {
         let [a0, b0, c0, d0] = [&a, &b, &c, &d].map(|f| evaluate(&QUADRATIC, f, q));
         let found = evaluate(&MONOMIALS, &commutator(&a, &b, &c, &d), q);
         assert!((found - (a0 * b0 - c0 * d0)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_norm_row_is_the_square_of_the_norm() {
+        let q = [0.3, -0.7, 1.1, 0.4];
+        let square: f64 = q.iter().map(|x| x * x).sum();
+        assert!((evaluate(&MONOMIALS, &NORM_ROW, q) - square * square).abs() < 1e-13);
+        let names = monomial_names();
+        assert_eq!([&names[0], &names[1], &names[34]], ["q1^4", "q1^3 q2", "q4^4"]);
+        assert!(names.contains(&"q1 q2 q3 q4".to_owned()) && names.contains(&"q1^2 q3^2".to_owned()));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The error metrics of the paper's figures, (61) and (62).
+//! The error metrics of the paper's figures, (61) and (62), and its parallax, (63).
 //!
 //! For everything a user looks at, [`RelativePose::rotation_error`](crate::RelativePose::rotation_error) and
 //! [`RelativePose::translation_error`](crate::RelativePose::translation_error) are the ones to use: the full
@@ -28,9 +28,35 @@ pub fn translation_metric(t: &Vector3<f64>, t_est: &Vector3<f64>) -> f64 {
     t.cross(&t_est).norm().atan2(t.dot(&t_est).abs())
 }
 
+/// The parallax (63): the length of the translation over the mean depth of the points in both views, whose signs do not count.
+///
+/// `None` without depths, or where their mean is zero or not finite.
+#[must_use]
+pub fn parallax(t: &Vector3<f64>, depths1: &[f64], depths2: &[f64]) -> Option<f64> {
+    let depths = || depths1.iter().chain(depths2).map(|z| z.abs());
+    let mean = depths().sum::<f64>() / depths().count() as f64;
+    let parallax = t.norm() / mean;
+    (mean.is_finite() && parallax.is_finite()).then_some(parallax)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::{Scene, SceneOptions};
+
+    #[test]
+    fn the_parallax_of_a_scene_is_the_length_of_its_translation() {
+        let scene = Scene::generate(&SceneOptions::default(), 63, 0).unwrap();
+        let depths1: Vec<f64> = scene.points1.iter().map(|x| x.z).collect();
+        let depths2: Vec<f64> = scene.points2().map(|x| x.z).collect();
+        let found = parallax(&scene.truth.t_21, &depths1, &depths2).unwrap();
+        assert!((found - scene.truth.t_21.norm()).abs() < 1e-14);
+        let double = parallax(&(2.0 * scene.truth.t_21), &depths1, &depths2).unwrap();
+        assert!((double - 2.0 * found).abs() < 1e-14);
+        assert_eq!(parallax(&scene.truth.t_21, &[], &[]), None);
+        assert_eq!(parallax(&Vector3::zeros(), &[0.0], &[0.0]), None);
+        assert_eq!(parallax(&Vector3::zeros(), &[f64::INFINITY], &[]), None);
+    }
 
     #[test]
     fn rotation_metric_is_half_the_angle() {

@@ -28,7 +28,7 @@ pub use camera::{
     FOCAL_LENGTH, IMAGE_SIZE, PRINCIPAL_POINT, is_inside_image, pixel_to_plane, plane_to_pixel,
 };
 pub use experiment::{Cell, FURTHER_POINTS, Figure, Problem, Reading};
-pub use metrics::{rotation_metric, translation_metric};
-pub use options::{Angle, Layout, Motion, SceneError, SceneOptions, View};
+pub use metrics::{parallax, rotation_metric, translation_metric};
+pub use options::{Angle, Boxes, Layout, Motion, SceneError, SceneOptions, View};
 pub use scene::Scene;
 pub use selection::{PoseErrors, choose};

@@ -2,19 +2,57 @@
 
 use std::f64::consts::{FRAC_PI_6, TAU};
 
-/// Where the points lie, in front of camera 1. Lengths are in the scene's own unit until everything is
+/// Where the points lie, in front of camera 1, within [`Boxes::points`]. Lengths are in the scene's own unit until everything is
 /// scaled to a mean depth of 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
-    /// Uniform in the box `x, y ∈ [−1, 1]`, `z ∈ [2, 4]`. The paper says only that there is a box.
+    /// Uniform in the box.
     #[default]
     General,
-    /// Uniform on a square of side 2 around `(0, 0, 3)`, its normal uniform on the sphere.
+    /// Uniform on a rectangle around the middle of the box, as wide and as high as the box, its normal uniform on the sphere.
     Coplanar,
 }
 
-/// How camera 2 is moved. A translation is uniform in the box `[−1, 1]³`, which keeps camera 2 out of the box of the
-/// points for every rotation.
+/// The boxes that points and translations are drawn from. The paper says only that there are boxes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Boxes {
+    /// The least and the largest x, y and z of a point in the frame of camera 1; by default `[−1, 1]² × [2, 4]`.
+    pub points: [[f64; 2]; 3],
+    /// The largest absolute x, y and z of a translation; by default 1 each, which keeps camera 2 out of the box of the points for
+    /// every rotation.
+    pub translation: [f64; 3],
+}
+
+impl Default for Boxes {
+    fn default() -> Self {
+        Self { points: [[-1.0, 1.0], [-1.0, 1.0], [2.0, 4.0]], translation: [1.0; 3] }
+    }
+}
+
+impl Boxes {
+    /// The middle of the points' box, and half of its extent.
+    pub(super) fn middle(&self) -> [[f64; 3]; 2] {
+        [self.points.map(|[low, high]| 0.5 * (low + high)), self.points.map(|[low, high]| 0.5 * (high - low))]
+    }
+
+    /// Camera 1 has all points in front of it, and the translation some extent.
+    fn check(&self) -> Result<(), SceneError> {
+        let is_box = self.points.iter().all(|[low, high]| low < high && low.is_finite() && high.is_finite());
+        let [centre, half] = self.middle();
+        // A rectangle may have any orientation about the middle.
+        let nearest = self.points[2][0].min(centre[2] - half[0].hypot(half[1]));
+        if !is_box || nearest <= 0.0 {
+            return Err(SceneError::PointsBox { found: self.points });
+        }
+        let extents = self.translation.iter();
+        if !extents.clone().all(|x| x.is_finite() && *x >= 0.0) || extents.sum::<f64>() == 0.0 {
+            return Err(SceneError::TranslationBox { found: self.translation });
+        }
+        Ok(())
+    }
+}
+
+/// How camera 2 is moved. A translation is uniform in [`Boxes::translation`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motion {
     /// Rotation and translation.
@@ -57,6 +95,8 @@ pub enum View {
 pub struct SceneOptions {
     /// Where the points lie.
     pub layout: Layout,
+    /// The sizes of what is drawn from.
+    pub boxes: Boxes,
     /// How camera 2 is moved.
     pub motion: Motion,
     /// The angle of its rotation, unused for [`Motion::PureTranslation`].
@@ -87,6 +127,7 @@ impl Default for SceneOptions {
     fn default() -> Self {
         Self {
             layout: Layout::General,
+            boxes: Boxes::default(),
             motion: Motion::General,
             angle: Angle::UpTo(TAU),
             view: View::Everywhere,
@@ -103,6 +144,7 @@ impl SceneOptions {
         if self.points == 0 {
             return Err(SceneError::NoPoints);
         }
+        self.boxes.check()?;
         if let Motion::Parallax(parallax) = self.motion
             && !(0.0..=1.0).contains(&parallax)
         {
@@ -126,6 +168,23 @@ pub enum SceneError {
     /// A scene without points has no scale.
     #[error("found 0 points, expected at least 1")]
     NoPoints,
+    /// The box of the points is none, or not in front of camera 1.
+    #[error(
+        "the box of the points is {found:?}, expected the least and the largest x, y and z, the largest larger, and every point \
+         in front of camera 1, also those of a rectangle that is turned about the middle of the box"
+    )]
+    PointsBox {
+        /// What was asked for.
+        found: [[f64; 2]; 3],
+    },
+    /// The box of the translations has no extent, a negative one, or none that is finite.
+    #[error(
+        "the box of the translations is {found:?}, expected three finite numbers that are not negative, one of them positive"
+    )]
+    TranslationBox {
+        /// What was asked for.
+        found: [f64; 3],
+    },
     /// The parallax is out of its range, or NaN.
     #[error("the parallax is {found}, expected a number from 0 to 1")]
     Parallax {

@@ -5,11 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Angle, Layout, Motion};
-
-/// The box of the points: centre and half extent.
-const BOX_CENTRE: Vector3<f64> = Vector3::new(0.0, 0.0, 3.0);
-const BOX_HALF_EXTENT: f64 = 1.0;
+use super::{Angle, Boxes, Layout, Motion};
 
 /// The generator of one scene: the seed is the key of the cipher, the index its stream, so that no two scenes
 /// share random numbers.
@@ -53,28 +49,31 @@ pub(super) fn rotation(rng: &mut ChaCha8Rng, motion: Motion, angle: Angle) -> Un
     UnitQuaternion::from_axis_angle(&axis, angle)
 }
 
-pub(super) fn translation(rng: &mut ChaCha8Rng) -> Vector3<f64> {
-    in_cube(rng)
+pub(super) fn translation(rng: &mut ChaCha8Rng, boxes: &Boxes) -> Vector3<f64> {
+    in_cube(rng).component_mul(&Vector3::from(boxes.translation))
 }
 
 /// Where points are drawn from.
 pub(super) struct Region {
+    centre: Vector3<f64>,
+    half: Vector3<f64>,
     /// For coplanar points, two unit vectors that span the plane.
     plane: Option<[Vector3<f64>; 2]>,
 }
 
 impl Region {
-    pub(super) fn new(rng: &mut ChaCha8Rng, layout: Layout) -> Self {
+    pub(super) fn new(rng: &mut ChaCha8Rng, layout: Layout, boxes: &Boxes) -> Self {
         let orientation = on_sphere(rng);
         let plane = (layout == Layout::Coplanar).then(|| {
             let along = orientation.cross(&Vector3::ith(orientation.iamin(), 1.0)).normalize();
             [along, orientation.cross(&along)]
         });
-        Self { plane }
+        let [centre, half] = boxes.middle().map(Vector3::from);
+        Self { centre, half, plane }
     }
 
     pub(super) fn point(&self, rng: &mut ChaCha8Rng) -> Vector3<f64> {
-        let p = BOX_HALF_EXTENT * in_cube(rng);
-        BOX_CENTRE + self.plane.map_or(p, |[u, v]| u * p.x + v * p.y)
+        let p = in_cube(rng).component_mul(&self.half);
+        self.centre + self.plane.map_or(p, |[u, v]| u * p.x + v * p.y)
     }
 }

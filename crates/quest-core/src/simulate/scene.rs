@@ -139,13 +139,13 @@ impl Draft {
         // Every motion draws the same numbers: scenes of the same seed and index that differ only in their
         // motion can be compared.
         let q_21 = sampling::rotation(rng, options.motion, options.angle);
-        let t_21 = sampling::translation(rng);
+        let t_21 = sampling::translation(rng, &options.boxes);
         let t_21 = match options.motion {
             Motion::General | Motion::PureTranslation => t_21,
             Motion::Parallax(_) => t_21.normalize(),
             Motion::PureRotation => Vector3::zeros(),
         };
-        Self { q_21, t_21, region: Region::new(rng, options.layout) }
+        Self { q_21, t_21, region: Region::new(rng, options.layout, &options.boxes) }
     }
 
     /// Draws the points. With a given parallax the length of t depends on all points, and whether a point is seen

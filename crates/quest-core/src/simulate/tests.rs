@@ -212,6 +212,39 @@ fn impossible_options_are_refused() {
 }
 
 #[test]
+fn boxes_hold_the_points_and_the_translations() {
+    let boxes = Boxes { points: [[-3.0, 1.0], [0.5, 0.6], [5.0, 9.0]], translation: [0.5, 0.0, 2.0] };
+    let options = SceneOptions { boxes, points: 20, ..SceneOptions::default() };
+    for scene in scenes(&options, 50) {
+        // Everything was scaled by one factor, which the ratios do not see.
+        for x in &scene.points1 {
+            let slopes = [x.x / x.z, x.y / x.z];
+            assert!(
+                (-3.0 / 5.0..=1.0 / 5.0).contains(&slopes[0]) && (0.5 / 9.0..=0.6 / 5.0).contains(&slopes[1])
+            );
+        }
+        assert!(scene.truth.t_21.y == 0.0 && scene.truth.t_21.x.abs() > 0.0);
+    }
+    let refused =
+        |boxes| Scene::generate(&SceneOptions { boxes, ..SceneOptions::default() }, SEED, 0).unwrap_err();
+    let points = [[-1.0, 1.0], [-1.0, 1.0], [1.0, 2.0]];
+    // A square of side 2 that is turned about (0, 0, 1.5) would touch camera 1 at a depth of 0.09; about (0, 0, 1.4) it is behind.
+    assert!(
+        Scene::generate(&SceneOptions { boxes: Boxes { points, ..Boxes::default() }, ..options }, SEED, 0)
+            .is_ok()
+    );
+    for points in [[[-1.0, 1.0], [-1.0, 1.0], [0.8, 2.0]], [[1.0, -1.0]; 3], [[f64::NAN; 2]; 3]] {
+        assert!(matches!(refused(Boxes { points, ..Boxes::default() }), SceneError::PointsBox { .. }));
+    }
+    for translation in [[0.0; 3], [-1.0, 1.0, 1.0], [f64::INFINITY; 3]] {
+        assert!(matches!(
+            refused(Boxes { translation, ..Boxes::default() }),
+            SceneError::TranslationBox { .. }
+        ));
+    }
+}
+
+#[test]
 fn further_points_belong_to_the_scene_and_leave_it_as_it_is() {
     for base in [SceneOptions::default(), SceneOptions::realistic()] {
         for noise_px in [0.0, 1.0] {

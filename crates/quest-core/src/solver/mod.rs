@@ -139,6 +139,8 @@ pub struct SolverInfo {
     pub max_candidates: usize,
     /// Where the method was published.
     pub reference: &'static str,
+    /// What the method as published is known to lose, counted; empty where it finds every pose of the tests.
+    pub lost: &'static str,
 }
 
 /// No solver has this name.
@@ -181,7 +183,7 @@ impl SolverName {
     #[must_use]
     pub fn info(self) -> SolverInfo {
         fn of<S: PoseSolver>(max_candidates: usize, reference: &'static str) -> SolverInfo {
-            SolverInfo { name: S::NAME, min_matches: S::MIN_MATCHES, max_candidates, reference }
+            SolverInfo { name: S::NAME, min_matches: S::MIN_MATCHES, max_candidates, reference, lost: "" }
         }
         match self {
             Self::Quest => of::<Quest>(21, "this project; elimination of Nistér, PAMI 2004"),
@@ -195,11 +197,15 @@ impl SolverName {
             Self::Homography => of::<Homography>(4, "Ma, Soatto, Košecká, Sastry, 2004, section 5.3"),
             Self::EightPoint => of::<EightPoint>(2, "Hartley, PAMI 1997"),
             #[cfg(feature = "faer")]
-            Self::QuestLiteral => of::<QuestLiteral>(20, "Fathian et al., RAS 2018, (41) to (44) as printed"),
+            Self::QuestLiteral => SolverInfo {
+                lost: quest_literal::LOST,
+                ..of::<QuestLiteral>(20, "Fathian et al., RAS 2018, (41) to (44) as printed")
+            },
             #[cfg(feature = "faer")]
-            Self::RelinearizationLiteral => {
-                of::<RelinearizationLiteral>(20, "Fathian et al., RAS 2018, (45) to (55) as printed")
-            }
+            Self::RelinearizationLiteral => SolverInfo {
+                lost: relinearization_literal::LOST,
+                ..of::<RelinearizationLiteral>(20, "Fathian et al., RAS 2018, (45) to (55) as printed")
+            },
         }
     }
 

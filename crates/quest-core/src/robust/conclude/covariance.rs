@@ -22,6 +22,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Matrix5, Matrix6, SMatrix, UnitQuaternion};
 
+use crate::RelativePose;
 use crate::epipolar_frame::tangent_basis;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::inverse_depth::{InverseDepth, Usual};
@@ -164,6 +165,13 @@ pub(crate) fn of_rotation(
     let any = Matrix3::identity() * (size.value * size.value + size.variance);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&any);
     Some(covariance).filter(says_something)
+}
+
+/// That of a pose of which the matches leave the rotation open: any rotation, and a translation that may be off by its length.
+pub(crate) fn of_nothing(pose: &RelativePose) -> Matrix6<f64> {
+    // A little less, so that rounding does not make more of it than there is to know.
+    let (turn, length) = (0.999 * PI * PI / 3.0, pose.t_21.norm_squared());
+    Matrix6::from_diagonal(&[turn, turn, turn, length, length, length].into())
 }
 
 /// Whether the rotation is known to half a turn. And the squares of lengths that bearings of 1e150 bring about are more than a

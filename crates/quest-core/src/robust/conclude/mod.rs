@@ -19,6 +19,8 @@ mod small_motion;
 
 use rand_chacha::ChaCha8Rng;
 
+#[cfg(test)]
+pub(crate) use covariance::says_something;
 pub(crate) use report::Answer;
 
 use crate::robust::conclude::alternatives::{alternatives, better_of};

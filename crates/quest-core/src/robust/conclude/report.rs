@@ -23,12 +23,14 @@ use crate::solver::shared::motion::Motion;
 use crate::structure::translation_direction;
 
 /// Which of two poses that explain the matches is given as the answer, the other being the runner-up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Answer {
     /// The one that explains them better.
     Best,
     /// The other, because something else is known.
     Other,
+    /// One that was found elsewhere, the best being the runner-up.
+    Given(Motion),
 }
 
 /// The inliers of a pure rotation are also within this multiple of the threshold of the point they are taken to.
@@ -55,16 +57,13 @@ pub(crate) fn report(
     answer: Answer,
 ) -> Option<Estimate> {
     let observations = poses.observations;
-    let (mut motion, mut second) = answers(poses, found, &conclusion);
-    if let (Answer::Other, Some(second)) = (answer, &mut second) {
-        std::mem::swap(&mut motion, second);
-    }
+    let (motion, mut second) = chosen(answer, answers(poses, found, &conclusion));
     let Conclusion { mut polished, small, plane, verdict, false_matches, false_share, .. } = conclusion;
     let (model, sigma) = (verdict.model, polished.sigma);
     polished.pose = poses.score(motion, poses.threshold());
     // The motions of an exact plane have a covariance of their own.
     let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
-    let small = small.filter(|_| !is_of_plane && answer == Answer::Best);
+    let small = small.filter(|_| !is_of_plane && matches!(answer, Answer::Best));
     if let Some(small) = &small {
         polished.pose.inliers.retain(|&i| small.is_likely[i as usize]);
     } else if model == Model::PureRotation {
@@ -90,7 +89,10 @@ pub(crate) fn report(
     } else if model == Model::PureRotation {
         (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
     } else {
-        (pose, covariance::of_pose(observations, &polished, size, false_matches)?)
+        let known = covariance::of_pose(observations, &polished, size, false_matches);
+        // What chose a given pose knows more than these matches do.
+        let open = || matches!(answer, Answer::Given(_)).then(|| covariance::of_nothing(&pose));
+        (pose, known.or_else(open)?)
     };
     if let (Some(small), Model::General) = (&small, model) {
         second = small.other_mode(&pose.t_21).or(second);
@@ -114,6 +116,15 @@ pub(crate) fn report(
         false_share,
         unmoved: 0,
     })
+}
+
+/// The motion that is the answer, and the runner-up.
+fn chosen(answer: Answer, (motion, second): (Motion, Option<Motion>)) -> (Motion, Option<Motion>) {
+    match (answer, second) {
+        (Answer::Other, Some(second)) => (second, Some(motion)),
+        (Answer::Given(given), _) => (given, Some(motion)),
+        (_, second) => (motion, second),
+    }
 }
 
 /// The motion that the model makes of the pose, and another that explains the matches nearly as well.

@@ -1,11 +1,13 @@
-//! From quaternions to candidates: what both of the paper's algorithms share.
+//! From matches to quartics and from quaternions to candidates: what both of the paper's algorithms share.
 //!
 //! For five matches a real solution is brought to its last digits by Newton's iteration, as for every published method
 //! here; the paper stops before. Translation and depths are those of section 8.
 
 use nalgebra::{Complex, Quaternion, UnitQuaternion};
 
+use super::constraints::Constraints;
 use crate::degeneracy::diagnose;
+use crate::quaternion::monomials::Quartic;
 use crate::solver::Kinds;
 use crate::solver::published::five_point;
 use crate::solver::shared::essential::real_part;
@@ -22,28 +24,40 @@ pub(super) const MIN_MATCHES: usize = 5;
 /// A solution of an algorithm: a complex quaternion of any scale, and whether its eigenvalue is real.
 pub(super) type Found = ([Complex<f64>; 4], bool);
 
-/// Fills `out` with the solutions that `method` hands over; bad input is answered with its reason.
-pub(super) fn solve(
-    kinds: Kinds,
-    matches: &[Correspondence],
-    out: &mut Candidates,
-    method: impl FnOnce(&mut dyn FnMut(Found)) -> bool,
-) {
-    if is_answered(MIN_MATCHES, matches, out) {
-        return;
+/// What one of the paper's algorithms does with the quartics (39).
+pub(super) trait Steps {
+    /// Hands over the solutions that it finds for so many matches; whether they could be computed.
+    fn solve(&mut self, matches: usize, quartics: &[Quartic], push: &mut dyn FnMut(Found)) -> bool;
+}
+
+/// An algorithm with the memory that it works in.
+#[derive(Default)]
+pub(super) struct Driver<S> {
+    constraints: Constraints,
+    quartics: Vec<Quartic>,
+    steps: S,
+}
+
+impl<S: Steps> Driver<S> {
+    /// Fills `out` with the solutions; bad input is answered with its reason.
+    pub(super) fn solve(&mut self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
+        if is_answered(MIN_MATCHES, matches, out) {
+            return;
+        }
+        if let Err(degeneracy) = five_point::null_space(matches) {
+            return out.set_degeneracy(degeneracy);
+        }
+        self.constraints.quartics(matches, &mut self.quartics);
+        let mut shortlist = Shortlist::new();
+        let mut push = |found| push(&mut shortlist, found, matches);
+        if !self.steps.solve(matches.len(), &self.quartics, &mut push) {
+            return out.set_degeneracy(match diagnose(matches) {
+                Degeneracy::TooFewMatches => Degeneracy::RankDeficient,
+                reason => reason,
+            });
+        }
+        shortlist.write(kinds.without_plane(), matches, out);
     }
-    if let Err(degeneracy) = five_point::null_space(matches) {
-        return out.set_degeneracy(degeneracy);
-    }
-    let kinds = kinds.without_plane();
-    let mut shortlist = Shortlist::new();
-    if !method(&mut |found| push(&mut shortlist, found, matches)) {
-        return out.set_degeneracy(match diagnose(matches) {
-            Degeneracy::TooFewMatches => Degeneracy::RankDeficient,
-            reason => reason,
-        });
-    }
-    shortlist.write(kinds, matches, out);
 }
 
 fn push(shortlist: &mut Shortlist, (q, is_real): Found, matches: &[Correspondence]) {

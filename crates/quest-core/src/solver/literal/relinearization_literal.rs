@@ -37,11 +37,11 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use nalgebra::Complex;
 
 use super::buffers::{Eigen, Factored, Matrix, Singular, zeros};
-use super::candidates::{self, Found};
-use super::constraints::Constraints;
+use super::candidates::{Driver, Found, MIN_MATCHES, Steps};
 use super::null_vectors::{Functionals, PRODUCT, Relinearized, SOLUTIONS, pair};
 use super::quest_literal::quaternion;
-use crate::quaternion::monomials::{MONOMIALS, Quartic};
+use crate::quaternion::NORM_ROW;
+use crate::quaternion::monomials::Quartic;
 use crate::solver::{Kinds, PoseSolver};
 use crate::{Candidates, Correspondence};
 
@@ -54,37 +54,23 @@ pub struct RelinearizationLiteral {
 
 impl PoseSolver for RelinearizationLiteral {
     const NAME: &'static str = "relinearization-literal";
-    const MIN_MATCHES: usize = candidates::MIN_MATCHES;
+    const MIN_MATCHES: usize = MIN_MATCHES;
 
     fn solve(&self, matches: &[Correspondence], out: &mut Candidates) {
-        BUFFERS.with_borrow_mut(|buffers| {
-            candidates::solve(self.kinds, matches, out, |push| buffers.solve(matches, push));
-        });
+        DRIVER.with_borrow_mut(|driver| driver.solve(self.kinds, matches, out));
     }
 }
+
+/// What the tests count (`what_the_printed_form_loses`).
+pub(crate) const LOST: &str =
+    "0, 4 and 67 of 100 poses at a parallax of 0.01, 0.001 and 0.0001, without noise";
 
 thread_local! {
-    static BUFFERS: RefCell<Buffers> = RefCell::new(Buffers::default());
+    static DRIVER: RefCell<Driver<Buffers>> = RefCell::default();
 }
-
-/// (40): the coefficients of `(q·q)²`.
-const NORM: Quartic = {
-    let mut row = [0.0; 35];
-    let mut k = 0;
-    while k < 35 {
-        let [a, b, c, d] = MONOMIALS[k];
-        if a % 2 == 0 && b % 2 == 0 && c % 2 == 0 && d % 2 == 0 {
-            row[k] = if a == 4 || b == 4 || c == 4 || d == 4 { 1.0 } else { 2.0 };
-        }
-        k += 1;
-    }
-    row
-};
 
 #[derive(Default)]
 struct Buffers {
-    constraints: Constraints,
-    quartics: Vec<Quartic>,
     c: Matrix,
     /// `v_1, …, v_n` and `x_p`, in columns.
     basis: Matrix,
@@ -116,14 +102,10 @@ fn weight(l: usize) -> f64 {
     (1.0 + l as f64).sqrt().fract() + 0.5
 }
 
-impl Buffers {
-    /// Hands over the solutions; whether they could be computed.
-    fn solve(&mut self, matches: &[Correspondence], push: &mut dyn FnMut(Found)) -> bool {
-        let mut quartics = std::mem::take(&mut self.quartics);
-        self.constraints.quartics(matches, &mut quartics);
-        let found = self.linearize(&quartics, directions(matches.len()))
-            && if matches.len() == 5 { self.of_five(&quartics) } else { self.of_more() };
-        self.quartics = quartics;
+impl Steps for Buffers {
+    fn solve(&mut self, matches: usize, quartics: &[Quartic], push: &mut dyn FnMut(Found)) -> bool {
+        let found = self.linearize(quartics, directions(matches))
+            && if matches == MIN_MATCHES { self.of_five(quartics) } else { self.of_more() };
         if !found || !self.actions() || !self.eigen.decompose(self.action.as_ref()) {
             return false;
         }
@@ -136,7 +118,9 @@ impl Buffers {
         }
         true
     }
+}
 
+impl Buffers {
     /// (46), (47): the directions and the particular solution `x_p = C† c`.
     fn linearize(&mut self, quartics: &[Quartic], n: usize) -> bool {
         let rows = quartics.len() + 1;
@@ -192,7 +176,7 @@ impl Buffers {
             };
             let by_form: [f64; 35] = std::array::from_fn(|i| times(&form, i));
             for i in 0..35 {
-                self.x[(i, k)] = times(&NORM, i);
+                self.x[(i, k)] = times(&NORM_ROW, i);
             }
             for i in 0..n {
                 self.w_0[(i, k)] = (0..35).map(|a| self.basis[(a, i)] * self.x[(a, k)]).sum();
@@ -244,7 +228,7 @@ impl Buffers {
 
 /// The entries of `C`: the quartics, then the norm.
 fn fill(quartics: &[Quartic], mut set: impl FnMut(usize, usize, f64)) {
-    for (row, quartic) in quartics.iter().chain([&NORM]).enumerate() {
+    for (row, quartic) in quartics.iter().chain([&NORM_ROW]).enumerate() {
         for (column, c) in quartic.iter().enumerate() {
             set(row, column, *c);
         }
