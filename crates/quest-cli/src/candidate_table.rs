@@ -148,9 +148,19 @@ mod tests {
             feasible: true,
             rotation_error_deg: Some(120.0),
             translation_error_deg: Some(1.5e-14),
+            rotation_metric_rad: None,
+            translation_metric_rad: None,
         };
         let candidates = vec![candidate; 20];
-        let record = SolveRecord { name: None, solver: "quest", matches: 120, degeneracy: None, candidates };
+        let record = SolveRecord {
+            name: None,
+            solver: "quest",
+            matches: 120,
+            degeneracy: None,
+            feasibility: None,
+            third_view: None,
+            candidates,
+        };
         let text = narrow(&record, Some(500.0)).trim_fmt();
         assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
         assert!(text.contains("120.000") && text.contains("120.0°") && text.contains("7.5e-14 px"), "{text}");

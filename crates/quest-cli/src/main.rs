@@ -5,10 +5,13 @@
 mod candidate_table;
 #[cfg(feature = "colmap")]
 mod colmap;
+mod drawing;
 mod estimate;
 mod estimate_table;
+mod figures;
 mod in_order;
 mod input;
+mod matrix;
 mod options;
 mod polynomials;
 mod progress;
@@ -57,6 +60,8 @@ enum Command {
     View(Box<view::Arguments>),
     #[cfg(feature = "colmap")]
     Colmap(Box<colmap::Arguments>),
+    Figures(Box<figures::Arguments>),
+    Matrix(Box<matrix::Arguments>),
     Polynomials(Box<polynomials::Arguments>),
     Solvers(solvers::Arguments),
     Completions(shell::Completions),
@@ -97,6 +102,8 @@ fn main() -> ExitCode {
         Command::View(arguments) => view::run(&arguments),
         #[cfg(feature = "colmap")]
         Command::Colmap(arguments) => colmap::run(&arguments),
+        Command::Figures(arguments) => figures::run(&arguments),
+        Command::Matrix(arguments) => matrix::run(&arguments),
         Command::Polynomials(arguments) => polynomials::run(&arguments),
         Command::Solvers(arguments) => solvers::run(&arguments),
         Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use quest_core::lanes::SearchScore;
 use quest_core::{
     Camera,
+    feasibility::Feasibility,
     solver::{Kinds, SolverName},
 };
 use quest_io::{Output, WriteError};
@@ -105,6 +106,13 @@ pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
 pub(crate) fn kinds_parser() -> impl clap::builder::TypedValueParser<Value = Kinds> {
     use clap::builder::{PossibleValuesParser, TypedValueParser};
     PossibleValuesParser::new(Kinds::CHOICES.map(Kinds::name)).try_map(|name| name.parse::<Kinds>())
+}
+
+/// A test of feasibility by its name, with the names listed in the help.
+pub(crate) fn feasibility_parser() -> impl clap::builder::TypedValueParser<Value = Feasibility> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    PossibleValuesParser::new(Feasibility::CHOICES.map(Feasibility::name))
+        .try_map(|name| name.parse::<Feasibility>())
 }
 
 /// A loss by its name, with the names listed in the help.

@@ -152,6 +152,10 @@ struct Run {
     camera: Camera,
     /// The features of the goal image, in pixels.
     goal: Vec<[f64; 2]>,
+    /// The features in the frame of the goal, in metres.
+    points: Vec<[f64; 3]>,
+    /// Whether the camera moves in space, not on a floor.
+    is_free: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -329,5 +333,12 @@ fn watch<P: Plant, L: ControlLaw, E: PoseEstimator>(
         true
     });
     summary.finish(&plant.pose());
-    Run { summary, frames, camera: setup.world.camera, goal: pixels }
+    Run {
+        summary,
+        frames,
+        camera: setup.world.camera,
+        goal: pixels,
+        points: setup.world.points.iter().map(|x| (*x).into()).collect(),
+        is_free: arguments.scenario != Scenario::Robot,
+    }
 }

@@ -1,10 +1,18 @@
 //! `quest-cli solve`: candidate poses from five or more correct matches.
 
-use std::io::{self, Write};
+mod given_rotation;
+mod third_view;
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
 
 use clap::Args;
+use nalgebra::UnitQuaternion;
 use quest_core::{
     Candidates, Correspondence, Degeneracy, InputError,
+    feasibility::Feasibility,
     solver::{Kinds, SolverName},
 };
 use quest_io::{Pair, ReadError, SolveRecord};
@@ -12,7 +20,7 @@ use quest_io::{Pair, ReadError, SolveRecord};
 use crate::{
     Failure, Outcome, candidate_table,
     input::InputOptions,
-    options::{OutputOptions, kinds_parser, solver_parser},
+    options::{OutputOptions, feasibility_parser, kinds_parser, solver_parser},
     rows, words,
     writer::{Record, Writer},
 };
@@ -25,6 +33,8 @@ Examples:
   quest-cli solve pixels.csv --camera1 PINHOLE,1024,768,1060,1060,514,384
   quest-cli solve - < pair.json
   quest-cli solve pairs.jsonl -o results.jsonl
+  quest-cli solve views12.json --third views13.json
+  quest-cli solve pair.json --rotation 0.943,-0.110,-0.223,-0.221
 
 Files:
   JSON: one object, a pair. Only \"matches\" is needed; q_21 (w, x, y, z) and t_21 are the truth.
@@ -39,6 +49,13 @@ Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
   --format chooses the format. Without it the extension of -o does; without both, the
   results of JSON Lines are JSON Lines, and others are a table.
+  With --third the candidate comes first whose depths in view 1 agree best with those of a candidate
+  of views 1 and 3 (section 10.1). The files share the points whose u1, v1 are the same numbers.
+  --feasibility theorem-2 lists the candidates that theorem 2 of the paper accepts: fewer, and none
+  of a camera that looks back at the points.
+  With --rotation nothing is solved for: the candidate is the translation and the depths that fit
+  this rotation best (section 8), of two or more matches.
+  Where the truth is known, JSON has the paper's metrics (61) and (62) in radians beside the errors.
   Results of JSON Lines are written one by one up to the first bad line. With -o or with
   --format json nothing is written if a line is bad.
 
@@ -59,9 +76,20 @@ pub(crate) struct Arguments {
     /// rotation alone. `planar`: as `all`, with the motions of a plane if a plane explains the matches.
     #[arg(long, value_name = "KINDS", default_value = Kinds::default().name(), value_parser = kinds_parser())]
     kinds: Kinds,
-    /// Also list the candidates that have points behind a camera.
+    /// Which candidates are feasible. `positive-depth`: all points in front of both cameras. `theorem-2`: theorem 2 of the paper's
+    /// appendix B.
+    #[arg(long, value_name = "TEST", default_value = Feasibility::default().name(), value_parser = feasibility_parser())]
+    feasibility: Feasibility,
+    /// Also list the candidates that are not feasible.
     #[arg(long)]
     all: bool,
+    /// The matches of view 1 with a third view: the candidate that agrees with them comes first.
+    #[arg(long, value_name = "FILE")]
+    third: Option<PathBuf>,
+    /// Find only translation and depths, for this rotation as a quaternion, scalar first.
+    #[arg(long, value_name = "w,x,y,z", value_parser = given_rotation::parse, allow_hyphen_values = true,
+        conflicts_with_all = ["solver", "kinds", "third"])]
+    rotation: Option<UnitQuaternion<f64>>,
     #[command(flatten)]
     output: OutputOptions,
 }
@@ -69,6 +97,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut pairs = arguments.input.open(arguments.output.quiet)?;
     let is_lines = pairs.is_lines();
+    if arguments.third.is_some() && is_lines {
+        return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
+    }
     let mut writer = Writer::open(&arguments.output, is_lines)?;
     let mut outcome = Outcome::Answer;
     while let Some(pair) = pairs.next()? {
@@ -86,38 +117,83 @@ fn one_pair(
     is_lines: bool,
     writer: &mut Writer<SolveRecord>,
 ) -> Result<Outcome, Failure> {
-    let info = arguments.solver.info();
-    let matches = enough_matches(pair, arguments.solver)?;
-    let mut found = Candidates::new();
-    arguments.solver.solve(arguments.kinds, &matches, &mut found);
+    let matches = arguments.matches(pair)?;
+    let mut found = arguments.candidates(&matches);
     // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
     if let (false, true, Some(degeneracy)) = (is_lines, found.is_empty(), found.degeneracy()) {
         return Err(pair.refuse(InputError::Degenerate(degeneracy)).into());
     }
-
-    let mut record = SolveRecord::new(pair.name.clone(), info.name, &matches, &found, &pair.truth);
+    let third_view = match &arguments.third {
+        Some(file) => third_view::decide(arguments, file, (pair, &matches), &mut found)?,
+        None => None,
+    };
+    let solver =
+        if arguments.rotation.is_some() { given_rotation::NAME } else { arguments.solver.info().name };
+    let record = SolveRecord::new(pair.name.clone(), solver, &matches, &found, &pair.truth);
+    let mut record = record.judged_by(arguments.feasibility, &found, &matches);
+    record.third_view = third_view;
+    if arguments.rotation.is_some() {
+        record.candidates.iter_mut().for_each(|c| c.kind = given_rotation::KIND);
+    }
     let hidden = if arguments.all { 0 } else { record.drop_unfeasible() };
     let heading = heading(pair, &record, found.degeneracy());
     let is_empty = record.candidates.is_empty();
     writer.write(&heading, record, pair.focal_length())?;
 
     if is_empty {
-        return Ok(no_pose(pair, &found, matches.len()));
+        return Ok(arguments.no_feasible_pose(pair, &found, matches.len()));
     }
     if hidden > 0 && !arguments.output.quiet {
-        let what = if hidden == 1 { "candidate with points" } else { "candidates with points" };
-        words::say(
-            "note",
-            &format!("{}: {hidden} {what} behind a camera not listed, --all lists them", pair.place),
-        );
+        let what = if hidden == 1 { "candidate" } else { "candidates" };
+        let why = match arguments.feasibility {
+            Feasibility::PositiveDepth => "with points behind a camera",
+            Feasibility::Theorem2 => "that theorem 2 rejects",
+        };
+        words::say("note", &format!("{}: {hidden} {what} {why} not listed, --all lists them", pair.place));
     }
     Ok(Outcome::Answer)
 }
 
+impl Arguments {
+    /// The matches of a pair, as many as are needed.
+    fn matches(&self, pair: &Pair) -> Result<Vec<Correspondence>, ReadError> {
+        match self.rotation {
+            Some(_) => at_least(pair, given_rotation::MIN_MATCHES),
+            None => enough_matches(pair, self.solver),
+        }
+    }
+
+    fn candidates(&self, matches: &[Correspondence]) -> Candidates {
+        let mut found = Candidates::new();
+        match self.rotation {
+            Some(q_21) => found.push(given_rotation::candidate(q_21, matches)),
+            None => self.solver.solve(self.kinds, matches, &mut found),
+        }
+        found
+    }
+
+    /// Says why no candidate is listed.
+    fn no_feasible_pose(&self, pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
+        if self.feasibility == Feasibility::PositiveDepth || found.is_empty() {
+            return no_pose(pair, found, matches);
+        }
+        let count = found.len();
+        words::say(
+            "no pose",
+            &format!("{}: theorem 2 accepts none of the {count} candidates; --all lists them", pair.place),
+        );
+        Outcome::NoPose
+    }
+}
+
 /// The matches of a pair, at least as many as the solver needs.
 pub(crate) fn enough_matches(pair: &Pair, solver: SolverName) -> Result<Vec<Correspondence>, ReadError> {
+    at_least(pair, solver.info().min_matches)
+}
+
+fn at_least(pair: &Pair, needed: usize) -> Result<Vec<Correspondence>, ReadError> {
     let matches = pair.correspondences()?;
-    let (found, needed) = (matches.len(), solver.info().min_matches);
+    let found = matches.len();
     if found < needed {
         return Err(pair.refuse(InputError::TooFewMatches { found, needed }));
     }
@@ -143,7 +219,11 @@ pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcom
 fn heading(pair: &Pair, record: &SolveRecord, degeneracy: Option<Degeneracy>) -> String {
     let name = record.name.clone().unwrap_or_else(|| pair.place.to_string());
     let degeneracy = degeneracy.map(|d| format!(", {d}")).unwrap_or_default();
-    words::one_line(&format!("{name}: {} matches, solver {}{degeneracy}", record.matches, record.solver))
+    let third = record.third_view.as_ref().map(third_view::words).unwrap_or_default();
+    words::one_line(&format!(
+        "{name}: {} matches, solver {}{degeneracy}{third}",
+        record.matches, record.solver
+    ))
 }
 
 impl Record for SolveRecord {

@@ -1,5 +1,6 @@
 //! The result of a robust estimate as it stands in files.
 
+use quest_core::disambiguation::Choice;
 use quest_core::robust::{Estimate, EstimateError, Evidence, RunnerUp, ThirdView};
 use quest_core::{InputError, RelativePose};
 use serde::Serialize;
@@ -136,6 +137,20 @@ pub struct ThirdViewRecord {
 }
 
 impl ThirdViewRecord {
+    /// The record of a pose of view 3 and the choice that led to it.
+    #[must_use]
+    pub fn chosen(pose_31: &RelativePose, choice: &Choice) -> Self {
+        let PoseRecord { q_21, r_21, t_21, .. } = PoseRecord::new(pose_31);
+        Self {
+            q_31: q_21,
+            r_31: r_21,
+            t_31: t_21,
+            disagreement: Some(choice.disagreement),
+            next_best: Some(choice.next_best).filter(|x| x.is_finite()),
+            ratio: Some(choice.ratio),
+        }
+    }
+
     /// The record of a third view.
     #[must_use]
     pub fn new(found: &ThirdView) -> Self {

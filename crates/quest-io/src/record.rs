@@ -1,10 +1,12 @@
 //! Results as they stand in files.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
+use quest_core::feasibility::Feasibility;
+use quest_core::simulate::{rotation_metric, translation_metric};
 use quest_core::{Candidate, Candidates, Correspondence, RelativePose};
 use serde::Serialize;
 
-use crate::Truth;
+use crate::{ThirdViewRecord, Truth};
 
 /// The result of one solve, candidates best first.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -18,6 +20,13 @@ pub struct SolveRecord {
     pub matches: usize,
     /// Why the matches determine no pose, or only a part of one: a name of [`quest_core::Degeneracy`].
     pub degeneracy: Option<&'static str>,
+    /// What decides whether a candidate is feasible, where it is not positive depth: a name of
+    /// [`quest_core::feasibility::Feasibility`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feasibility: Option<&'static str>,
+    /// What a third view says, where there is one: the first candidate is its choice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub third_view: Option<ThirdViewRecord>,
     /// The poses that may be the true one.
     pub candidates: Vec<CandidateRecord>,
 }
@@ -42,7 +51,7 @@ pub struct CandidateRecord {
     pub residual: f64,
     /// How many matches have positive depth in both views.
     pub in_front: usize,
-    /// Whether all of them have.
+    /// Whether all of them have, or, where another test was chosen, whether the candidate passes it.
     pub feasible: bool,
     /// The angle in degrees to the true rotation, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,6 +59,12 @@ pub struct CandidateRecord {
     /// The angle in degrees to the true direction of translation, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub translation_error_deg: Option<f64>,
+    /// The paper's metric (61) in radians: half the angle to the true rotation, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_metric_rad: Option<f64>,
+    /// The paper's metric (62) in radians: the angle between the translations whatever their signs, where the true one is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub translation_metric_rad: Option<f64>,
 }
 
 impl SolveRecord {
@@ -67,8 +82,25 @@ impl SolveRecord {
             solver,
             matches: matches.len(),
             degeneracy: found.degeneracy().map(quest_core::Degeneracy::name),
+            feasibility: None,
+            third_view: None,
             candidates: found.iter().map(|c| CandidateRecord::new(c, matches, truth)).collect(),
         }
+    }
+
+    /// The same with another test of feasibility. `found` are the candidates of the record, in its order.
+    #[must_use]
+    pub fn judged_by(
+        mut self,
+        feasibility: Feasibility,
+        found: &[Candidate],
+        matches: &[Correspondence],
+    ) -> Self {
+        for (record, candidate) in self.candidates.iter_mut().zip(found) {
+            record.feasible = feasibility.accepts(candidate, matches);
+        }
+        self.feasibility = (feasibility != Feasibility::default()).then_some(feasibility.name());
+        self
     }
 
     /// Removes the candidates that are not feasible and returns how many there were.
@@ -97,8 +129,15 @@ impl CandidateRecord {
             feasible: candidate.in_front == matches.len(),
             rotation_error_deg: truth.rotation_error_deg(pose),
             translation_error_deg: truth.translation_error_deg(pose),
+            rotation_metric_rad: truth.q_21.map(|q| rotation_metric(&q, &pose.q_21)),
+            translation_metric_rad: truth.t_21.map(|t| translation_metric(&of_usual_length(t), &pose.t_21)),
         }
     }
+}
+
+/// A vector whose length can be squared; zero stays zero.
+fn of_usual_length(t: Vector3<f64>) -> Vector3<f64> {
+    if t.amax() > 0.0 { t.unscale(t.amax()) } else { t }
 }
 
 fn depths(pose: &RelativePose, m: &Correspondence) -> (Option<f64>, Option<f64>) {
@@ -118,7 +157,7 @@ pub(crate) fn unsigned_zero(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::UnitQuaternion;
     use quest_core::{CandidateKind, correspondence};
 
     use super::*;
@@ -152,6 +191,9 @@ mod tests {
             let known = record(t, Truth { q_21, t_21: Some(Vector3::new(0.0, length, 0.0)) });
             assert!((known.rotation_error_deg.unwrap() - 1.0).abs() < 1e-12);
             assert!((known.translation_error_deg.unwrap() - 90.0).abs() < 1e-12);
+            // (61) is half the angle; (62) ignores the sign.
+            assert!((known.rotation_metric_rad.unwrap() - 0.5_f64.to_radians()).abs() < 1e-12);
+            assert!((known.translation_metric_rad.unwrap() - 90.0_f64.to_radians()).abs() < 1e-12);
         }
         let standing = record(t, Truth { q_21: None, t_21: Some(Vector3::zeros()) });
         assert_eq!(standing.translation_error_deg, None);

@@ -9,6 +9,8 @@ pub struct Figure {
     pub title: String,
     /// What the reader should know, in plain text.
     pub caption: String,
+    /// What the styles of lines mean, where that is the same in every panel.
+    pub key: Vec<(Style, String)>,
     /// Rows of panels. Panels of a column have one width.
     pub rows: Vec<Vec<Panel>>,
 }
@@ -24,6 +26,13 @@ impl Figure {
     #[must_use]
     pub fn caption(self, caption: impl Into<String>) -> Self {
         Self { caption: caption.into(), ..self }
+    }
+
+    /// Sets what the styles of lines mean.
+    #[must_use]
+    pub fn key<'a>(self, key: impl IntoIterator<Item = (Style, &'a str)>) -> Self {
+        let key = key.into_iter().map(|(style, words)| (style, words.to_owned())).collect();
+        Self { key, ..self }
     }
 
     /// Adds a row of panels below the others.
@@ -47,19 +56,34 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Whether a unit of x is as long as one of y: for paths, and for images.
     pub equal_scales: bool,
+    /// Whether axes, grid and numbers are left out: for drawings in perspective.
+    pub is_bare: bool,
 }
 
 impl Panel {
     /// A panel without series.
     #[must_use]
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self { title: title.into(), x, y, series: Vec::new(), equal_scales: false }
+        Self { title: title.into(), x, y, series: Vec::new(), equal_scales: false, is_bare: false }
     }
 
     /// Adds a series on top of the others.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
+        self
+    }
+
+    /// A drawing with one scale and without axes.
+    #[must_use]
+    pub fn drawing(title: impl Into<String>) -> Self {
+        Self { equal_scales: true, is_bare: true, ..Self::new(title, Axis::default(), Axis::default()) }
+    }
+
+    /// The line below the title of a drawing.
+    #[must_use]
+    pub fn subtitled(mut self, subtitle: impl Into<String>) -> Self {
+        self.y.label = subtitle.into();
         self
     }
 
@@ -79,10 +103,16 @@ pub enum Style {
     Dashed,
     /// A thick line: the one to look at.
     Thick,
+    /// A thin, light line: what lies behind, a grid.
+    Faint,
+    /// A filled area, light.
+    Area,
     /// Dots.
     Points,
     /// Crosses: goals, starts.
     Crosses,
+    /// The label alone, at the last point.
+    Words,
 }
 
 /// A curve, or a set of points.
@@ -116,6 +146,13 @@ impl Series {
         Self { style: Style::Points, label: String::new(), ..Self::line(name, points) }
     }
 
+    /// An arrow from one point to another, its head of this length, without a label: for panels with equal scales.
+    #[must_use]
+    pub fn arrow(name: impl Into<String>, from: [f64; 2], to: [f64; 2], head: f64) -> Self {
+        let points = arrow(from, to, head);
+        Self { label: String::new(), ..Self::line(name, points) }
+    }
+
     /// Sets the colour.
     #[must_use]
     pub fn coloured(self, colour: Colour) -> Self {
@@ -138,5 +175,34 @@ impl Series {
     #[must_use]
     pub fn banded(self, band: Vec<[f64; 3]>) -> Self {
         Self { band, ..self }
+    }
+}
+
+/// The outline of an arrow: its shaft and the two sides of its head.
+pub(crate) fn arrow(from: [f64; 2], to: [f64; 2], head: f64) -> Vec<[f64; 2]> {
+    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+    let length = dx.hypot(dy);
+    if length == 0.0 || !length.is_finite() {
+        return vec![from, to];
+    }
+    let (ux, uy) = (dx / length * head, dy / length * head);
+    // Half as wide as it is long.
+    let side = |s: f64| [to[0] - ux - s * 0.45 * uy, to[1] - uy + s * 0.45 * ux];
+    vec![from, to, side(1.0), to, side(-1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arrow_ends_in_a_head() {
+        let points = arrow([0.0, 0.0], [2.0, 0.0], 0.5);
+        assert_eq!(points.len(), 5);
+        let bits = |p: [f64; 2]| p.map(f64::to_bits);
+        assert_eq!((bits(points[0]), bits(points[1])), (bits([0.0, 0.0]), bits([2.0, 0.0])));
+        let sides = [points[2], points[4]];
+        assert!(sides.iter().all(|p| (p[0] - 1.5).abs() < 1e-12 && (p[1].abs() - 0.225).abs() < 1e-12));
+        assert_eq!(arrow([1.0, 1.0], [1.0, 1.0], 0.5).len(), 2);
     }
 }

@@ -33,5 +33,5 @@ pub use colour::Colour;
 pub use error::PlotError;
 pub use figure::{Figure, Panel, Series, Style};
 pub use page::Page;
-pub use space::{Part, Space};
+pub use space::{Part, Projection, Space};
 pub use svg::to_svg;

@@ -32,7 +32,7 @@ pub(super) struct FrameRecord {
     /// What the loop does: `tracking`, or why the robot holds.
     state: &'static str,
     /// The true pose, in metres.
-    truth: Pose,
+    pub(super) truth: Pose,
     /// The position of the camera in the goal's frame, in metres.
     pub(super) position: [f64; 3],
     /// The pose that the command is based on, in the unit of the goal's depths.

@@ -1,6 +1,8 @@
 //! `quest-cli simulate`: the experiments of section 9.
 
+mod boxes;
 mod curves;
+mod pairs;
 mod record;
 mod run;
 mod statistics;
@@ -11,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use quest_core::{
-    simulate::{Figure, SceneOptions},
+    simulate::{Boxes, Figure, SceneOptions},
     solver::{Kinds, SolverName},
 };
 use quest_io::Output;
@@ -29,6 +31,9 @@ Examples:
   quest-cli simulate --figure 4 --trials 1000 -o figure4.csv --plot figure4.html
   quest-cli simulate --figure 6 --solvers quest,nister --scenes realistic
   quest-cli simulate --table 1
+  quest-cli simulate --figure 4 --points-box -1,1,-1,1,5,7 --translation-box 1,1,0.2
+  quest-cli simulate --pairs 100 --noise 0.75 -o scenes.jsonl
+  quest-cli solve scenes.jsonl
 
 Figures:
   4 noise, general points        5 noise, coplanar points      6 parallax
@@ -41,6 +46,9 @@ Readings (compare solvers only within one of them):
   all       the candidate of any kind closest to the truth: also real parts of complex
             solutions, and the rotation alone
   selected  the candidate that 30 further points of the scene choose, without the truth
+
+--pairs writes scenes instead of solving them: JSON Lines that `solve` and `estimate` read, points
+on the plane z = 1 with the true pose, whose |t| is the parallax (63).
 
 The same seed gives the same numbers on any number of threads. The times of table 1 are
 measured on one thread. ± is the 95 % confidence interval of the mean. \"ahead of\" counts the
@@ -75,6 +83,20 @@ pub(crate) struct Arguments {
     /// Number of points of a scene.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(5..=1000))]
     points: u16,
+    /// The box of the points in the frame of camera 1; the paper does not give its size.
+    #[arg(long, value_name = "x0,x1,y0,y1,z0,z1", value_parser = boxes::points, allow_hyphen_values = true,
+        default_value = boxes::POINTS)]
+    points_box: [[f64; 2]; 3],
+    /// The largest absolute x, y and z of a translation.
+    #[arg(long, value_name = "x,y,z", value_parser = boxes::translation, default_value = boxes::TRANSLATION)]
+    translation_box: [f64; 3],
+    /// Write this many general scenes as pairs, and run nothing.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000),
+        conflicts_with_all = ["figure", "table", "plot", "trials"])]
+    pairs: Option<u32>,
+    /// Standard deviation of the noise of these pairs, in pixels of the camera (60).
+    #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "pairs")]
+    noise: f64,
     /// Round pixels to whole numbers after the noise. Table 1 always does, as in the paper.
     #[arg(long)]
     rounded: bool,
@@ -121,6 +143,18 @@ pub(crate) fn parse_plot(text: &str) -> Result<Plot, String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let format = arguments.output.format(Format::Table);
     let mut output = arguments.output.open()?;
+    if let Some(count) = arguments.pairs {
+        let options = SceneOptions { noise_px: arguments.noise, ..arguments.base() };
+        if arguments.output.format(Format::Jsonl) != Format::Jsonl {
+            return Err(Failure::Arguments(
+                "--pairs writes JSON Lines, expected --format jsonl or a name that ends with .jsonl"
+                    .to_owned(),
+            ));
+        }
+        pairs::write(&mut output, &options, arguments.seed, count)?;
+        output.finish()?;
+        return Ok(Outcome::Answer);
+    }
     let plot = match &arguments.plot {
         Some(plot) => Some((plot, Output::open(Some(Path::new(&plot.path)))?)),
         None => None,
@@ -143,6 +177,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 impl Arguments {
+    /// The scenes, before a figure changes what it varies.
+    fn base(&self) -> SceneOptions {
+        let base = match self.scenes {
+            Scenes::Paper => SceneOptions::default(),
+            Scenes::Realistic => SceneOptions::realistic(),
+        };
+        let boxes = Boxes { points: self.points_box, translation: self.translation_box };
+        SceneOptions { points: usize::from(self.points), rounded: self.rounded, boxes, ..base }
+    }
+
     fn plan(&self) -> Result<Run, Failure> {
         let is_whole = self.figure.is_empty() && self.table.is_none();
         let mut figures = if is_whole { Figure::ALL.to_vec() } else { self.figure.clone() };
@@ -155,10 +199,6 @@ impl Arguments {
                 "--solvers: {name} needs {needed} points, the scenes have {points}; --points {needed} gives them more"
             )));
         }
-        let base = match self.scenes {
-            Scenes::Paper => SceneOptions::default(),
-            Scenes::Realistic => SceneOptions::realistic(),
-        };
         Ok(Run {
             figures,
             has_table: is_whole || self.table.is_some(),
@@ -170,7 +210,7 @@ impl Arguments {
                 Scenes::Paper => "paper",
                 Scenes::Realistic => "realistic",
             },
-            base: SceneOptions { points, rounded: self.rounded, ..base },
+            base: self.base(),
             threads: self.threads,
             is_quiet: self.output.quiet,
         })

@@ -55,6 +55,14 @@ impl Run {
         SolverName::ALL.into_iter().filter(is_able).collect()
     }
 
+    /// The solvers of table 1: these, and the paper's own steps.
+    pub(crate) fn timed_solvers(&self) -> Vec<SolverName> {
+        if !self.solvers.is_empty() {
+            return self.solvers.clone();
+        }
+        self.all_solvers().into_iter().chain(SolverName::LITERAL).collect()
+    }
+
     /// All numbers, figure by figure, the table last.
     pub(crate) fn execute(&self) -> Result<Vec<Record>, Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();

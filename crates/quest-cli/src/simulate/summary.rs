@@ -91,8 +91,27 @@ fn is_ahead(record: &Record) -> bool {
     bounds.is_some_and(|(difference, ci95)| difference + ci95 < -ROUNDING)
 }
 
+/// What a row of table 1 compares with the paper's.
+fn what_it_is(solver: &str) -> &'static str {
+    match solver {
+        "quest-literal" | "relinearization-literal" => "the paper's steps as printed",
+        "quest" => "this project's, beside QuEst",
+        "quest-eigen" | "relinearization" => "this project's form of the paper's",
+        _ => "as published",
+    }
+}
+
 fn of_table(records: &[Record]) -> String {
-    let mut table = table::empty(["points", "solver", "kinds", "µs", "median", "paper, µs", "times faster"]);
+    let mut table = table::empty([
+        "points",
+        "solver",
+        "kinds",
+        "µs",
+        "median",
+        "paper, µs",
+        "times faster",
+        "what it is",
+    ]);
     for record in records.iter().filter(|r| r.quantity == Quantity::TimeMs) {
         let micro = |ms: Option<f64>| ms.map(|ms| 1e3 * ms);
         let smallest = micro(record.smallest);
@@ -106,6 +125,7 @@ fn of_table(records: &[Record]) -> String {
             shown(micro(record.median)),
             shown(micro(record.paper)),
             table::right(faster.unwrap_or_default()),
+            Cell::new(what_it_is(record.solver)),
         ]);
     }
     format!(

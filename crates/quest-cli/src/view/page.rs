@@ -22,9 +22,17 @@ pub(super) fn html(solved: &Solved) -> Result<String, PlotError> {
         .to_html()
 }
 
-/// The name of a candidate in the legend.
-pub(super) fn name(index: usize, candidate: &Candidate) -> String {
+/// Candidates with a button of their own; the others share one.
+const OWN: usize = 9;
+
+/// The name of a candidate in the table.
+fn name(index: usize, candidate: &Candidate) -> String {
     format!("{} {}", index + 1, candidate.kind.name().replace('_', " "))
+}
+
+/// The name of a candidate in the legend.
+pub(super) fn button(index: usize, candidate: &Candidate) -> String {
+    if index < OWN { name(index, candidate) } else { format!("{} and more", OWN + 1) }
 }
 
 /// An angle in pixels where there are cameras, else in milliradians.
@@ -50,7 +58,7 @@ fn residuals(solved: &Solved) -> Figure {
     for (index, candidate) in solved.candidates.iter().enumerate() {
         let errors = solved.matches.iter().map(|m| candidate.pose.sampson_error(m).max(ROUNDING));
         let points = errors.enumerate().map(|(k, error)| [k as f64, in_unit(solved, error)]);
-        let series = Series::points(name(index, candidate), points.collect()).coloured(colour::nth(index));
+        let series = Series::points(button(index, candidate), points.collect()).coloured(colour::nth(index));
         panel = panel.with(series);
     }
     Figure::new("Residuals")

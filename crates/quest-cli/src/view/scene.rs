@@ -26,7 +26,7 @@ pub(super) fn space(solved: &Solved) -> Space {
          that of camera 2.",
     );
     for (index, candidate) in solved.candidates.iter().enumerate() {
-        let (name, colour) = (page::name(index, candidate), colour::nth(index));
+        let (name, colour) = (page::button(index, candidate), colour::nth(index));
         let pose = &candidate.pose;
         space = space
             .with(rays(&name, colour, pose, &solved.matches, index == 0))

@@ -200,3 +200,122 @@ fn csv_has_a_row_for_each_candidate() {
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(csv.lines().all(|line| line.split(',').count() == columns));
 }
+
+#[test]
+fn theorem_2_lists_fewer_candidates_and_the_true_one() {
+    let file = example("points.json");
+    let (_, by_depth) = solved(&[&file, "--kinds", "exact"]);
+    let (few, by_theorem) = solved(&[&file, "--kinds", "exact", "--feasibility", "theorem-2"]);
+    assert_eq!((&by_depth["feasibility"], &by_theorem["feasibility"]), (&Value::Null, &json!("theorem-2")));
+    assert!(candidates(&by_theorem).len() <= candidates(&by_depth).len());
+    assert!(few.stderr.contains("that theorem 2 rejects"), "{}", few.stderr);
+    let is_true = |c: &Value| c["rotation_error_deg"].as_f64().unwrap() < 1e-6;
+    assert!(candidates(&by_theorem).iter().any(is_true));
+    // (61) is half the angle.
+    for c in candidates(&by_theorem) {
+        let (degrees, metric) =
+            (c["rotation_error_deg"].as_f64().unwrap(), c["rotation_metric_rad"].as_f64().unwrap());
+        assert!((degrees.to_radians() / 2.0 - metric).abs() < 1e-9, "{c}");
+        assert!((0.0..=1.571).contains(&c["translation_metric_rad"].as_f64().unwrap()));
+    }
+    let unknown = run(&["solve", &file, "--feasibility", "theorem-3"]);
+    assert!(unknown.status == 2 && unknown.stderr.contains("theorem-2"), "{}", unknown.stderr);
+}
+
+/// Five points that cameras see which were moved by `t`, and turned about y.
+fn five_seen_from(t: [f64; 3], angle: f64) -> Value {
+    let points = [[-0.5, 0.3, 2.0], [0.6, -0.4, 2.8], [0.1, 0.5, 3.4], [-0.4, -0.5, 2.5], [0.9, 0.2, 3.1]];
+    let (s, c) = angle.sin_cos();
+    let matches = points.map(|[x, y, z]| {
+        let moved = [c * x + s * z + t[0], y + t[1], -s * x + c * z + t[2]];
+        [x / z, y / z, moved[0] / moved[2], moved[1] / moved[2]]
+    });
+    json!({ "matches": matches, "q_21": [(angle / 2.0).cos(), 0.0, (angle / 2.0).sin(), 0.0], "t_21": t })
+}
+
+#[test]
+fn a_third_view_puts_the_true_candidate_of_five_points_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut other = five_seen_from([-0.3, 0.2, 0.1], -0.15);
+    // Lists need not have the same order.
+    other["matches"].as_array_mut().unwrap().reverse();
+    fs::write(folder.path().join("12.json"), five_seen_from([0.4, 0.1, -0.2], 0.1).to_string()).unwrap();
+    fs::write(folder.path().join("13.json"), other.to_string()).unwrap();
+    let with = |arguments: &[&str]| {
+        run_in(folder.path(), &[&["solve", "12.json", "--quiet"], arguments].concat(), b"")
+    };
+    let run = with(&["--third", "13.json", "--format", "json"]);
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    let result: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert!(candidates(&result).len() > 1);
+    assert!(candidates(&result)[0]["rotation_error_deg"].as_f64().unwrap() < 1e-6, "{result}");
+    let third = &result["third_view"];
+    assert!(
+        third["disagreement"].as_f64().unwrap() < 1e-6 && third["next_best"].as_f64().unwrap() > 1e-3,
+        "{third}"
+    );
+    assert!((third["q_31"][0].as_f64().unwrap() - 0.075_f64.cos()).abs() < 1e-9);
+    // |(−0.3, 0.2, 0.1)| / |(0.4, 0.1, −0.2)|
+    assert!((third["ratio"].as_f64().unwrap() - (14.0_f64 / 21.0).sqrt()).abs() < 1e-6);
+    assert!(with(&["--third", "13.json"]).stdout.contains("the first by a third view"));
+
+    let mut strange = five_seen_from([-0.3, 0.2, 0.1], -0.15);
+    strange["matches"][0][0] = json!(0.3);
+    fs::write(folder.path().join("14.json"), strange.to_string()).unwrap();
+    let few = with(&["--third", "14.json"]);
+    assert_eq!(few.status, 2);
+    assert!(
+        few.stderr.contains("4 of its points of view 1") && few.stderr.contains("at least 5"),
+        "{}",
+        few.stderr
+    );
+    let lines = run_in(folder.path(), &["solve", "-", "--input-format", "jsonl", "--third", "13.json"], b"");
+    assert!(lines.status == 2 && lines.stderr.contains("--third"), "{}", lines.stderr);
+    assert_eq!(with(&["--third", "15.json"]).status, 2);
+}
+
+#[test]
+fn a_rotation_that_is_known_has_its_translation_and_depths() {
+    let text = five_seen_from([0.4, 0.1, -0.2], 0.1).to_string();
+    let q = format!("{},0,{},0", 0.05_f64.cos(), 0.05_f64.sin());
+    let run = run_in(Path::new("."), &["solve", "-", "--format", "json", "--rotation", &q], text.as_bytes());
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    let result: Value = serde_json::from_str(&run.stdout).unwrap();
+    let [found] = candidates(&result) else { panic!("{result}") };
+    assert_eq!((&found["kind"], &found["in_front"]), (&json!("given_rotation"), &json!(5)));
+    assert!(found["translation_error_deg"].as_f64().unwrap() < 1e-6);
+    // Depths and translation have one scale.
+    let (t, z) = (numbers(&found["t_21"]), numbers(&found["depths1"]));
+    assert!((z[0] / 2.0 - t[0] / 0.4).abs() < 1e-9 && (z[4] / 3.1 - t[0] / 0.4).abs() < 1e-9);
+    for wrong in ["1,0,0", "2,0,0,0", "a,b,c,d"] {
+        assert_eq!(run_in(Path::new("."), &["solve", "-", "--rotation", wrong], text.as_bytes()).status, 2);
+    }
+    let both =
+        run_in(Path::new("."), &["solve", "-", "--rotation", &q, "--solver", "nister"], text.as_bytes());
+    assert_eq!(both.status, 2);
+    let one = json!({ "matches": [[0.1, 0.1, 0.2, 0.1]] }).to_string();
+    let few = run_in(Path::new("."), &["solve", "-", "--rotation", &q], one.as_bytes());
+    assert!(few.status == 2 && few.stderr.contains("at least 2"), "{}", few.stderr);
+}
+
+#[test]
+fn the_constraint_matrix_has_names_and_the_norm() {
+    let result = run(&["matrix", &example("points.json"), "--format", "json"]);
+    let matrix: Value = serde_json::from_str(&result.stdout).unwrap();
+    let rows = matrix["rows"].as_array().unwrap();
+    assert_eq!((rows.len(), &matrix["columns"][1]), (11, &json!("q1^3 q2")));
+    assert_eq!(
+        (&rows[0]["triple"], &rows[10]["triple"], &rows[10]["c"]),
+        (&json!([0, 1, 2]), &Value::Null, &json!(1.0))
+    );
+    let table = run(&["matrix", &example("points.json")]).stdout;
+    assert!(table.contains("norm") && table.contains("q1 q2 q3 q4"), "{table}");
+    let csv = run(&["matrix", &example("points.json"), "--format", "csv", "--no-norm"]).stdout;
+    assert_eq!(csv.lines().count(), 11);
+    let few = run_in(
+        Path::new("."),
+        &["matrix", "-"],
+        json!({ "matches": [[0.1, 0.1, 0.2, 0.1]] }).to_string().as_bytes(),
+    );
+    assert!(few.status == 2 && few.stderr.contains("at least 3"), "{}", few.stderr);
+}

@@ -91,11 +91,15 @@ fn solvers_in_every_format() {
         serde_json::from_str(&run(&["solvers", "--no-times", "--format", "json"]).stdout).unwrap();
     let lines = run(&["solvers", "--no-times", "--format", "jsonl"]).stdout;
     let csv = run(&["solvers", "--no-times", "--format", "csv"]).stdout;
-    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,reference"));
+    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,reference,lost"));
     for (index, solver) in list.as_array().unwrap().iter().enumerate() {
         let name = solver["name"].as_str().unwrap();
         assert!(table.stdout.contains(name));
         assert!(csv.lines().nth(index + 1).unwrap().starts_with(name));
+        // The forms as printed lose poses, and say which, below the table.
+        let lost = solver["lost"].as_str().unwrap();
+        assert_eq!(lost.contains("parallax"), name.ends_with("-literal"));
+        assert!(lost.is_empty() || table.stdout.contains(&format!("{name} loses {lost}")));
         assert_eq!(
             &serde_json::from_str::<serde_json::Value>(lines.lines().nth(index).unwrap()).unwrap(),
             solver
@@ -106,7 +110,7 @@ fn solvers_in_every_format() {
 #[test]
 fn solvers_are_timed() {
     let csv = run(&["solvers", "--format", "csv"]).stdout;
-    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,time_us,reference"));
+    assert_eq!(csv.lines().next(), Some("name,min_matches,max_candidates,time_us,reference,lost"));
     let list: serde_json::Value =
         serde_json::from_str(&run(&["solvers", "--format", "json"]).stdout).unwrap();
     for solver in list.as_array().unwrap() {

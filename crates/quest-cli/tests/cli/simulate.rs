@@ -1,6 +1,6 @@
 //! `quest-cli simulate`: the same numbers on any number of threads, sound records, charts, bad arguments.
 
-use std::{collections::BTreeSet, fs};
+use std::{collections::BTreeSet, fs, path::Path};
 
 use crate::{run, run_in};
 
@@ -62,6 +62,10 @@ fn every_solver_is_timed_beside_the_paper() {
     }
     let quest = rows.iter().find(|row| row["solver"] == "quest").unwrap();
     assert_eq!(quest["paper"], "0.8857");
+    // The paper's steps as printed, at each of its numbers of points.
+    let literal = rows.iter().filter(|row| row["solver"].ends_with("-literal"));
+    let literal: Vec<_> = literal.map(|row| (row["value"].as_str(), row["paper"].as_str())).collect();
+    assert_eq!(literal, [("5.0", "0.8857"), ("5.0", "41.511"), ("6.0", "11.2461"), ("7.0", "0.9355")]);
 }
 
 #[test]
@@ -106,4 +110,43 @@ fn bad_arguments_are_named() {
         assert_eq!((found.status, found.stdout.as_str()), (2, ""), "{arguments:?}");
         assert!(found.stderr.contains(expected), "{arguments:?}: {}", found.stderr);
     }
+}
+
+#[test]
+fn scenes_are_pairs_that_solve_reads() {
+    let arguments = ["simulate", "--pairs", "3", "--seed", "7", "--scenes", "realistic"];
+    let lines =
+        run(&[&arguments[..], &["--points-box", "-1,1,-1,1,5,9", "--translation-box", "1,0,0.5"]].concat());
+    assert_eq!((lines.status, lines.stdout.lines().count(), lines.stderr.as_str()), (0, 3, ""));
+    for line in lines.stdout.lines() {
+        let pair: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert_eq!(pair["t_21"][1], 0.0);
+    }
+    let solved = run_in(
+        Path::new("."),
+        &["solve", "-", "--input-format", "jsonl", "--quiet"],
+        lines.stdout.as_bytes(),
+    );
+    assert_eq!(solved.status, 0, "{}", solved.stderr);
+    for line in solved.stdout.lines() {
+        let result: serde_json::Value = serde_json::from_str(line).unwrap();
+        let errors = result["candidates"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| c["rotation_error_deg"].as_f64().unwrap());
+        assert!(errors.fold(f64::INFINITY, f64::min) < 1e-6);
+    }
+    let impossible = [
+        &["--points-box", "1,-1,-1,1,2,4"][..],
+        &["--points-box", "1,2"],
+        &["--translation-box", "0,0,0"],
+        &["--figure", "4"],
+        &["--format", "csv"],
+    ];
+    for wrong in impossible {
+        let refused = run(&[&arguments[..], wrong].concat());
+        assert!(refused.status == 2 && !refused.stderr.is_empty(), "{wrong:?} {}", refused.stderr);
+    }
+    assert_eq!(run(&["simulate", "--noise", "1"]).status, 2);
 }

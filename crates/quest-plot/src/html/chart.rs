@@ -1,6 +1,6 @@
 //! A panel as plotly sees it.
 
-use plotly::common::{DashType, ExponentFormat, Fill, HoverInfo, Line, Marker, MarkerSymbol, Mode};
+use plotly::common::{DashType, ExponentFormat, Fill, HoverInfo, Line, Marker, MarkerSymbol, Mode, Position};
 use plotly::layout::{Axis as PlotlyAxis, AxisRange, AxisType, HoverMode, Layout, Margin};
 use plotly::{Plot, Scatter};
 
@@ -15,12 +15,18 @@ pub(super) fn plot(panel: &Panel) -> Plot {
         }
         plot.add_trace(curve(panel, series));
     }
-    let y = if panel.equal_scales { axis(&panel.y).scale_anchor("x") } else { axis(&panel.y) };
+    let shown = |given: &Axis| if panel.is_bare { axis(given).visible(false).title("") } else { axis(given) };
+    let y = if panel.equal_scales { shown(&panel.y).scale_anchor("x") } else { shown(&panel.y) };
+    let margin = if panel.is_bare {
+        Margin::new().left(8).right(8).top(8).bottom(8)
+    } else {
+        Margin::new().left(64).right(12).top(8).bottom(48)
+    };
     let layout = Layout::new()
         .show_legend(false)
         .hover_mode(HoverMode::Closest)
-        .margin(Margin::new().left(64).right(12).top(8).bottom(48))
-        .x_axis(axis(&panel.x))
+        .margin(margin)
+        .x_axis(shown(&panel.x))
         .y_axis(y);
     plot.set_layout(layout);
     plot
@@ -65,13 +71,39 @@ fn curve(panel: &Panel, series: &Series) -> Box<Scatter<f64, f64>> {
         .hover_template(format!("{}: %{{x:.4~g}}<br>{}: %{{y:.4~g}}", panel.x.label, panel.y.label));
     let line = Line::new().color(colour.clone());
     let marker = Marker::new().color(colour);
+    // Only a drawing has its words within: at axes the legend names the curves.
+    let label = if panel.is_bare { series.label.as_str() } else { "" };
     match series.style {
+        Style::Words => drawn.mode(Mode::Text).text_array(labels(series)).hover_info(HoverInfo::Skip),
+        Style::Points if !label.is_empty() => drawn
+            .mode(Mode::MarkersText)
+            .marker(marker.size(7))
+            .text_array(labels(series))
+            .text_position(Position::TopRight),
+        Style::Faint => {
+            drawn.mode(Mode::Lines).line(line.width(1.0)).opacity(0.35).hover_info(HoverInfo::Skip)
+        }
+        Style::Area => drawn
+            .mode(Mode::Lines)
+            .line(line.width(0.0))
+            .fill(Fill::ToSelf)
+            .fill_color(translucent(series.colour))
+            .hover_info(HoverInfo::Skip),
         Style::Line => drawn.mode(Mode::Lines).line(line.width(1.6)),
         Style::Thick => drawn.mode(Mode::Lines).line(line.width(3.0)),
         Style::Dashed => drawn.mode(Mode::Lines).line(line.width(1.6).dash(DashType::Dash)),
         Style::Points => drawn.mode(Mode::Markers).marker(marker.size(6)),
         Style::Crosses => drawn.mode(Mode::Markers).marker(marker.size(9).symbol(MarkerSymbol::X)),
     }
+}
+
+/// The label at the last point, and none at the others.
+fn labels(series: &Series) -> Vec<&str> {
+    let mut all = vec![""; series.points.len()];
+    if let Some(last) = all.last_mut() {
+        *last = series.label.as_str();
+    }
+    all
 }
 
 fn translucent(Colour(red, green, blue): Colour) -> String {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use plotly::Plot;
 
 use crate::page::Item;
-use crate::{Colour, Figure, Page, PlotError, Space};
+use crate::{Colour, Figure, Page, PlotError, Space, Style};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -48,11 +48,12 @@ fn plotly_js() -> String {
 fn figure_section(figure: &Figure) -> Result<String, PlotError> {
     let series = figure.rows.iter().flatten().flat_map(|panel| &panel.series);
     let legend = legend(series.map(|s| (s.name.as_str(), s.colour, true)));
-    let mut rows = String::new();
+    let mut rows = key(&figure.key);
     for row in &figure.rows {
         rows.push_str("<div class=\"row\">\n");
         for panel in row {
-            rows.push_str(&plot("panel", &panel.title, &chart::plot(panel))?);
+            let subtitle = if panel.is_bare { panel.y.label.as_str() } else { "" };
+            rows.push_str(&plot("panel", &panel.title, subtitle, &chart::plot(panel))?);
         }
         rows.push_str("</div>\n");
     }
@@ -61,7 +62,7 @@ fn figure_section(figure: &Figure) -> Result<String, PlotError> {
 
 fn space_section(space: &Space) -> Result<String, PlotError> {
     let legend = legend(space.parts.iter().map(|p| (p.name.as_str(), p.colour, p.is_shown)));
-    let plot = plot("space", "", &space::plot(space))?;
+    let plot = plot("space", "", "", &space::plot(space))?;
     Ok(section(&space.title, &space.caption, &format!("{legend}{plot}")))
 }
 
@@ -85,13 +86,34 @@ fn legend<'a>(entries: impl Iterator<Item = (&'a str, Colour, bool)>) -> String 
     format!("<div class=\"legend\">\n{buttons}</div>\n")
 }
 
+/// A piece of line of each style, with what it means.
+fn key(key: &[(Style, String)]) -> String {
+    let mut out = String::new();
+    for (style, words) in key {
+        let (width, dashes) = match style {
+            Style::Thick => (3.0, ""),
+            Style::Dashed => (1.6, " stroke-dasharray=\"6 4\""),
+            Style::Faint => (1.0, " opacity=\"0.35\""),
+            _ => (1.6, ""),
+        };
+        let words = escaped(words);
+        let _ = writeln!(
+            out,
+            "<span><svg width=\"34\" height=\"8\"><path d=\"M0 4h34\" stroke=\"currentColor\" \
+             stroke-width=\"{width}\"{dashes}/></svg>{words}</span>"
+        );
+    }
+    if out.is_empty() { out } else { format!("<div class=\"key\">\n{out}</div>\n") }
+}
+
 /// A place for a plot, with its data beside it.
-fn plot(class: &str, title: &str, plot: &Plot) -> Result<String, PlotError> {
+fn plot(class: &str, title: &str, subtitle: &str, plot: &Plot) -> Result<String, PlotError> {
     // Within a script element only `<` could end it.
     let data = serde_json::to_string(plot)?.replace('<', "\\u003c");
-    let title = escaped(title);
+    let (title, subtitle) = (escaped(title), escaped(subtitle));
+    let subtitle = if subtitle.is_empty() { subtitle } else { format!("<small>{subtitle}</small>") };
     Ok(format!(
-        "<figure class=\"{class}\"><figcaption>{title}</figcaption>\
+        "<figure class=\"{class}\"><figcaption>{title}{subtitle}</figcaption>\
          <div class=\"plot\"></div><script type=\"application/json\">{data}</script></figure>\n"
     ))
 }

@@ -4,7 +4,7 @@ for (const section of document.querySelectorAll("section")) {
   const buttons = [...section.querySelectorAll(".legend button")];
   for (const plot of plots) {
     const { data, layout } = JSON.parse(plot.nextElementSibling.textContent);
-    Plotly.newPlot(plot, data, layout, { responsive: true, displaylogo: false });
+    Plotly.newPlot(plot, data, layout, { responsive: true, displayModeBar: false });
   }
   const show = (button, isShown) => {
     button.setAttribute("aria-pressed", isShown);

@@ -12,7 +12,10 @@ pub(super) fn plot(space: &Space) -> Plot {
     for part in &space.parts {
         add(&mut plot, part);
     }
-    let axis = |name: &str| Axis::new().title(name).grid_color(GRID.hex()).show_spikes(false);
+    let axis = |name: &str| {
+        let axis = Axis::new().title(name).grid_color(GRID.hex()).show_spikes(false);
+        if space.is_bare { axis.visible(false) } else { axis }
+    };
     let [x, y, z] = &space.axes;
     let ([up_x, up_y, up_z], [eye_x, eye_y, eye_z]) = (space.up, space.eye);
     let camera = Camera::new().up((up_x, up_y, up_z).into()).eye((eye_x, eye_y, eye_z).into());

@@ -11,7 +11,7 @@ use plotters::style::WHITE;
 use plotters::style::text_anchor::HPos;
 
 use crate::colour::{INK, MUTED};
-use crate::{Figure, PlotError};
+use crate::{Figure, PlotError, Style};
 
 type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -19,6 +19,7 @@ type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 const WIDTH: i32 = 1200;
 const TITLE: i32 = 44;
 const CAPTION_LINE: i32 = 20;
+const KEY: i32 = 22;
 const GAP: i32 = 16;
 /// Characters on a line of the caption.
 const CAPTION_WIDTH: usize = 165;
@@ -60,7 +61,8 @@ fn drawing(error: impl std::fmt::Display) -> PlotError {
 fn figure_height(figure: &Figure) -> i32 {
     let rows: i32 = figure.rows.iter().map(|row| row_height(row.len()) + GAP).sum();
     let lines = i32::try_from(wrapped(&figure.caption).len()).unwrap_or(i32::MAX / FINE);
-    TITLE + lines * CAPTION_LINE + rows + GAP
+    let key = if figure.key.is_empty() { 0 } else { KEY };
+    TITLE + lines * CAPTION_LINE + key + rows + GAP
 }
 
 /// The fewer panels beside each other, the higher they are.
@@ -80,6 +82,10 @@ fn draw_figure(canvas: &Canvas, figure: &Figure, top: i32) -> Result<(), PlotErr
         ink::text(canvas, &line, (20, y + 6), HPos::Left, ink::Weight::Normal, 14, MUTED)?;
         y += CAPTION_LINE;
     }
+    if !figure.key.is_empty() {
+        draw_key(canvas, &figure.key, y + KEY / 2)?;
+        y += KEY;
+    }
     for row in &figure.rows {
         let height = row_height(row.len());
         let count = i32::try_from(row.len()).unwrap_or(i32::MAX);
@@ -90,6 +96,23 @@ fn draw_figure(canvas: &Canvas, figure: &Figure, top: i32) -> Result<(), PlotErr
             panel::draw(&canvas.clone().shrink((fine[0], fine[1]), size), panel, [width, height])?;
         }
         y += height + GAP;
+    }
+    Ok(())
+}
+
+/// A piece of line of each style, with what it means.
+fn draw_key(canvas: &Canvas, key: &[(Style, String)], y: i32) -> Result<(), PlotError> {
+    const SAMPLE: i32 = 34;
+    const LETTER: i32 = 7;
+    let mut x = 20;
+    for (style, words) in key {
+        ink::path(
+            canvas,
+            vec![(FINE * x, FINE * y), (FINE * (x + SAMPLE), FINE * y)],
+            panel::stroke(*style, INK),
+        )?;
+        ink::text(canvas, words, (x + SAMPLE + 8, y), HPos::Left, ink::Weight::Normal, 13, INK)?;
+        x += SAMPLE + 34 + LETTER * i32::try_from(words.chars().count()).unwrap_or(0);
     }
     Ok(())
 }

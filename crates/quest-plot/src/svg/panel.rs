@@ -5,14 +5,14 @@ use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::element::{Circle, Cross};
 use plotters::prelude::Cartesian2d;
 use plotters::style::text_anchor::HPos;
-use plotters::style::{Color, TRANSPARENT};
+use plotters::style::{Color, ShapeStyle, TRANSPARENT};
 
 use super::ink::{self, Weight};
 use super::{Canvas, DASHED_WIDTH, FINE, drawing};
 use crate::axis::Ruler;
 use crate::colour::{GRID, INK, MUTED};
 use crate::label::spread;
-use crate::{Panel, PlotError, Series, Style};
+use crate::{Colour, Panel, PlotError, Series, Style};
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
 
@@ -20,12 +20,18 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>
 const HEAD: i32 = 48;
 const FOOT: i32 = 44;
 const LEFT: i32 = 56;
+/// The same of a drawing without axes, and what is left free around it.
+const BARE_HEAD: i32 = 40;
+const MARGIN: i32 = 12;
 /// Width of a letter of a label, height of its line.
 const LETTER: f64 = 6.6;
 const LINE: f64 = 14.0;
 
 /// Draws on a canvas of this size in units.
 pub(super) fn draw(canvas: &Canvas, panel: &Panel, size: [i32; 2]) -> Result<(), PlotError> {
+    if panel.is_bare {
+        return draw_bare(canvas, panel, size);
+    }
     let right = label_width(panel);
     ink::text(canvas, &panel.title, (LEFT, 12), HPos::Left, Weight::Bold, 15, INK)?;
     ink::text(canvas, &panel.y.label, (LEFT, 33), HPos::Left, Weight::Normal, 13, MUTED)?;
@@ -55,6 +61,34 @@ pub(super) fn draw(canvas: &Canvas, panel: &Panel, size: [i32; 2]) -> Result<(),
         draw_series(canvas, &mut chart, panel, series, [x, y])?;
     }
     draw_labels(canvas, &chart, panel, [x, y])
+}
+
+/// A drawing under its title: no axes, and every label where its series ends.
+fn draw_bare(canvas: &Canvas, panel: &Panel, size: [i32; 2]) -> Result<(), PlotError> {
+    ink::text(canvas, &panel.title, (MARGIN, 12), HPos::Left, Weight::Bold, 15, INK)?;
+    ink::text(canvas, &panel.y.label, (MARGIN, 31), HPos::Left, Weight::Normal, 13, MUTED)?;
+    let inside = [size[0] - 2 * MARGIN, size[1] - BARE_HEAD - MARGIN];
+    let [x, y] = extents(panel, inside);
+    let mut chart = ChartBuilder::on(canvas)
+        .margin_top(FINE * BARE_HEAD)
+        .margin_bottom(FINE * MARGIN)
+        .margin_left(FINE * MARGIN)
+        .margin_right(FINE * MARGIN)
+        .build_cartesian_2d(Ruler::new(panel.x.scale, x), Ruler::new(panel.y.scale, y))
+        .map_err(drawing)?;
+    for series in &panel.series {
+        draw_series(canvas, &mut chart, panel, series, [x, y])?;
+    }
+    for series in panel.series.iter().filter(|s| !s.label.is_empty()) {
+        let Some(last) = series.points.iter().rev().find(|p| is_inside(panel, [x, y], **p)) else { continue };
+        let (px, py) = local(canvas, &chart, *last);
+        let (position, anchor) = match series.style {
+            Style::Words => ((px / FINE, py / FINE), HPos::Center),
+            _ => ((px / FINE + 7, py / FINE - 7), HPos::Left),
+        };
+        ink::text(canvas, &series.label, position, anchor, Weight::Normal, 12, series.colour)?;
+    }
+    Ok(())
 }
 
 /// Width of the labels beside the axes.
@@ -94,6 +128,20 @@ fn is_inside(panel: &Panel, [x, y]: [[f64; 2]; 2], point: [f64; 2]) -> bool {
     panel.x.shows(point[0]) && panel.y.shows(point[1]) && within(x, point[0]) && within(y, point[1])
 }
 
+/// How a line of a style is drawn.
+pub(super) fn stroke(style: Style, colour: Colour) -> ShapeStyle {
+    let (tenths, opacity) = match style {
+        Style::Thick => (26, 1.0),
+        Style::Faint => (9, 0.35),
+        _ => (15, 1.0),
+    };
+    let mut stroke = ink::stroke(colour, tenths, opacity);
+    if style == Style::Dashed {
+        stroke.stroke_width = DASHED_WIDTH.unsigned_abs();
+    }
+    stroke
+}
+
 fn draw_series(
     canvas: &Canvas,
     chart: &mut Chart,
@@ -112,11 +160,7 @@ fn draw_series(
         ink::area(canvas, outline, series.colour, 0.10)?;
     }
     let dots = || series.points.iter().filter(|p| is_inside(p)).map(|p| here(*p));
-    let tenths = if series.style == Style::Thick { 26 } else { 15 };
-    let mut stroke = ink::stroke(series.colour, tenths, 1.0);
-    if series.style == Style::Dashed {
-        stroke.stroke_width = DASHED_WIDTH.unsigned_abs();
-    }
+    let stroke = stroke(series.style, series.colour);
     match series.style {
         Style::Points => dots().try_for_each(|p| {
             canvas
@@ -126,7 +170,9 @@ fn draw_series(
         Style::Crosses => {
             dots().try_for_each(|p| canvas.draw(&Cross::new(p, 5 * FINE, stroke)).map_err(drawing))
         }
-        Style::Line | Style::Thick | Style::Dashed => {
+        Style::Words => Ok(()),
+        Style::Area => ink::area(canvas, dots().collect(), series.colour, 0.12),
+        Style::Line | Style::Thick | Style::Dashed | Style::Faint => {
             for run in series.points.split(|p| !is_inside(p)).filter(|run| run.len() > 1) {
                 ink::path(canvas, run.iter().map(|p| here(*p)).collect(), stroke)?;
             }
