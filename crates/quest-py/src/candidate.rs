@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use quest_core::feasibility::Feasibility;
 use quest_core::{Correspondence, RelativePose};
 
 use crate::pose::{Pose, PoseState};
@@ -33,14 +34,31 @@ pub(crate) struct Candidate {
     /// int : How many of the matches have positive depth in both views.
     #[pyo3(get)]
     in_front: usize,
+    /// bool : Whether the candidate passes the test of feasibility of ``solve``: by default, whether every match
+    /// lies in front of both cameras.
+    #[pyo3(get)]
+    feasible: bool,
 }
 
 impl Candidate {
     /// A candidate of the core for these matches.
-    pub(crate) fn new(candidate: &quest_core::Candidate, matches: &[Correspondence]) -> Self {
+    pub(crate) fn new(
+        candidate: &quest_core::Candidate,
+        matches: &[Correspondence],
+        feasibility: Feasibility,
+    ) -> Self {
+        let feasible = feasibility.accepts(candidate, matches);
         let quest_core::Candidate { kind, pose, residual, in_front } = *candidate;
         let (depths1, depths2) = matches.iter().map(|m| depths(&pose, m)).unzip();
-        Self { kind: kind.name().to_owned(), pose: Pose::new(&pose), depths1, depths2, residual, in_front }
+        Self {
+            kind: kind.name().to_owned(),
+            pose: Pose::new(&pose),
+            depths1,
+            depths2,
+            residual,
+            in_front,
+            feasible,
+        }
     }
 }
 
@@ -50,13 +68,13 @@ fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
     pose.depths(m).map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
 }
 
-type State = (String, PoseState, Vec<f64>, Vec<f64>, f64, usize);
+type State = (String, PoseState, Vec<f64>, Vec<f64>, f64, usize, bool);
 
 /// The candidate that ``Candidate.__reduce__`` took apart.
 #[pyfunction]
 pub(crate) fn _candidate(state: State) -> Candidate {
-    let (kind, pose, depths1, depths2, residual, in_front) = state;
-    Candidate { kind, pose: Pose::from_state(pose), depths1, depths2, residual, in_front }
+    let (kind, pose, depths1, depths2, residual, in_front, feasible) = state;
+    Candidate { kind, pose: Pose::from_state(pose), depths1, depths2, residual, in_front, feasible }
 }
 
 #[pymethods]
@@ -102,12 +120,6 @@ impl Candidate {
         self.depths2.to_pyarray(py)
     }
 
-    /// bool : Whether every match lies in front of both cameras.
-    #[getter]
-    fn feasible(&self) -> bool {
-        self.in_front == self.depths1.len()
-    }
-
     /// The candidate as plain numbers and lists, ready for ``json.dumps``.
     ///
     /// Returns
@@ -125,7 +137,7 @@ impl Candidate {
         dict.set_item("depths2", finite(&self.depths2))?;
         dict.set_item("residual", self.residual)?;
         dict.set_item("in_front", self.in_front)?;
-        dict.set_item("feasible", self.feasible())?;
+        dict.set_item("feasible", self.feasible)?;
         Ok(dict)
     }
 
@@ -136,8 +148,9 @@ impl Candidate {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (State,))> {
-        let Self { kind, pose, depths1, depths2, residual, in_front } = self;
-        let state = (kind.clone(), pose.state(), depths1.clone(), depths2.clone(), *residual, *in_front);
+        let Self { kind, pose, depths1, depths2, residual, in_front, feasible } = self;
+        let depths = (depths1.clone(), depths2.clone());
+        let state = (kind.clone(), pose.state(), depths.0, depths.1, *residual, *in_front, *feasible);
         Ok((py.import("quest_pose._core")?.getattr("_candidate")?, (state,)))
     }
 }

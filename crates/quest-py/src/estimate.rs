@@ -108,7 +108,7 @@ pub(crate) fn estimate(
     let invalid: Invalid = invalid.parse()?;
     let views = Views::new(x1, x2, camera1, camera2)?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
-    let pose = initial_pose.as_ref().map(pose).transpose()?;
+    let pose = initial_pose.as_ref().map(|given| pose("initial_pose", given)).transpose()?;
     let direction = known_direction.as_ref().map(direction).transpose()?;
     let options = Options {
         threshold: threshold_for(views.cameras().is_some(), threshold)?,
@@ -198,20 +198,27 @@ pub(crate) fn threshold_for(has_cameras: bool, threshold: Option<f64>) -> PyResu
     })
 }
 
-fn pose((r, t): &(Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<RelativePose> {
-    let rows = arrays::matrix3("initial_pose[0]", r)?;
-    let t = vector3("initial_pose[1]", t)?;
+/// A rotation matrix and a translation of the argument `name`.
+pub(crate) fn pose(name: &str, (r, t): &(Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<RelativePose> {
+    let t = vector3(&format!("{name}[1]"), t)?;
+    Ok(RelativePose::new(rotation(&format!("{name}[0]"), r)?, t))
+}
+
+/// The rotation of the matrix `name`.
+pub(crate) fn rotation(name: &str, r: &Bound<'_, PyAny>) -> PyResult<UnitQuaternion<f64>> {
+    let rows: [[f64; 3]; 3] = arrays::rows(name, r)?.try_into().map_err(|rows: Vec<[f64; 3]>| {
+        ShapeMismatch::new_err(format!("{name} has {} rows, expected a matrix of shape (3, 3)", rows.len()))
+    })?;
     // nalgebra keeps columns, NumPy rows.
     let matrix = nalgebra::Matrix3::from(rows).transpose();
     let is_rotation = (matrix * matrix.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-6
         && matrix.determinant() > 0.0;
     if !is_rotation {
-        return Err(QuestError::new_err(
-            "initial_pose[0] is not a rotation matrix, expected R with R Rᵀ = I",
-        ));
+        return Err(QuestError::new_err(format!(
+            "{name} is not a rotation matrix, expected R with R Rᵀ = I and det R = 1"
+        )));
     }
-    let rotation = nalgebra::Rotation3::from_matrix_unchecked(matrix);
-    Ok(RelativePose::new(UnitQuaternion::from_rotation_matrix(&rotation), t))
+    Ok(UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix)))
 }
 
 fn direction(
@@ -224,7 +231,8 @@ fn direction(
     })
 }
 
-fn vector3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
+/// Three finite numbers of the argument `name`.
+pub(crate) fn vector3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
     let numbers: [f64; 3] = arrays::vector(name, given)?.try_into().map_err(|v: Vec<f64>| {
         ShapeMismatch::new_err(format!("{name} has the shape ({},), expected (3,)", v.len()))
     })?;

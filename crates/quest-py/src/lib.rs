@@ -5,6 +5,7 @@ mod arrays;
 mod batch_result;
 mod camera;
 mod candidate;
+mod choose;
 mod colmap;
 mod errors;
 mod estimate;
@@ -12,6 +13,8 @@ mod estimate_batch;
 mod estimate_result;
 mod foreign_camera;
 mod html;
+mod paper;
+mod polynomials;
 mod pose;
 mod servo;
 mod solve;
@@ -33,6 +36,8 @@ mod _core {
     #[pymodule_export]
     use crate::candidate::{_candidate, Candidate};
     #[pymodule_export]
+    use crate::choose::_choose;
+    #[pymodule_export]
     use crate::colmap::{_colmap_export, _colmap_read_pairs, _colmap_verify, _colmap_write};
     #[pymodule_export]
     use crate::errors::{
@@ -44,6 +49,12 @@ mod _core {
     use crate::estimate_batch::estimate_batch;
     #[pymodule_export]
     use crate::estimate_result::{_estimate, _runner_up, Estimate, RunnerUp};
+    #[pymodule_export]
+    use crate::paper::{
+        _columns, _parallax, _rotation_metric, _scene, _translation_and_depths, _translation_metric,
+    };
+    #[pymodule_export]
+    use crate::polynomials::_solve_polynomials;
     #[pymodule_export]
     use crate::servo::{_command, CameraServo, Command, Controller, RobotServo, joint_velocities};
     #[pymodule_export]

@@ -3,6 +3,7 @@
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use quest_core::correspondence::Usable;
+use quest_core::feasibility::{Feasibility, UnknownFeasibility};
 use quest_core::solver::{Kinds, SolverName, UnknownKinds};
 use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence, quaternion};
 
@@ -22,16 +23,21 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 /// camera1, camera2 : Camera or array_like of shape (3, 3), optional
 ///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
 /// solver : str, optional
-///     One of the names in ``solvers()``; the first of them where absent.
+///     One of the names in ``solvers()``; the first of them where absent. The paper's own steps are
+///     ``"quest-literal"`` and ``"relinearization-literal"``, which are slower and lose some solutions.
 /// kinds : {"all", "exact", "planar"}
 ///     Which candidates to return. ``"all"``: every candidate. ``"exact"``: the real solutions of the constraints
 ///     alone. ``"planar"``: every candidate, and the motions of a plane if one explains the matches.
+/// feasibility : {"positive-depth", "theorem-2"}
+///     What makes a candidate ``feasible``. ``"positive-depth"``: every match in front of both cameras.
+///     ``"theorem-2"``: theorem 2 of the paper's appendix B, which accepts fewer candidates, and none of a camera
+///     that looks back at the points from their far side.
 ///
 /// Returns
 /// -------
 /// list of Candidate
 ///     Best first: most points in front of both cameras, then the smallest residual. The list includes candidates
-///     with points behind a camera; their ``feasible`` is False. It is empty if the constraints have no real
+///     that are not feasible. It is empty if the constraints have no real
 ///     solution and ``kinds`` is ``"exact"``. Matches that a rotation alone explains give that rotation, with
 ///     ``t = 0``.
 ///
@@ -48,13 +54,14 @@ use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 /// BadCamera
 ///     For an impossible camera, or a pixel for which it has no viewing ray.
 /// QuestError
-///     For an unknown ``solver`` or ``kinds``. It is also the base class of the errors above.
+///     For an unknown ``solver``, ``kinds`` or ``feasibility``. It is also the base class of the errors above.
 ///
 /// Notes
 /// -----
 /// The lock of the interpreter is released while the solver works.
 #[pyfunction]
-#[pyo3(signature = (x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all"))]
+#[pyo3(signature = (x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all", feasibility="positive-depth"))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn solve(
     py: Python<'_>,
     x1: &Bound<'_, PyAny>,
@@ -63,8 +70,11 @@ pub(crate) fn solve(
     camera2: Option<&Bound<'_, PyAny>>,
     solver: Option<&str>,
     kinds: &str,
+    feasibility: &str,
 ) -> PyResult<Vec<Candidate>> {
     let solver = solver_named(solver)?;
+    let feasibility: Feasibility =
+        feasibility.parse().map_err(|error: UnknownFeasibility| QuestError::new_err(error.to_string()))?;
     let kinds: Kinds = kinds.parse().map_err(|error: UnknownKinds| QuestError::new_err(error.to_string()))?;
     let views = Views::new(x1, x2, camera1, camera2)?;
     let solved = py.detach(|| {
@@ -75,7 +85,7 @@ pub(crate) fn solve(
         }
         let mut out = Candidates::new();
         solver.solve(kinds, &matches, &mut out);
-        let candidates: Vec<_> = out.iter().map(|c| Candidate::new(c, &matches)).collect();
+        let candidates: Vec<_> = out.iter().map(|c| Candidate::new(c, &matches, feasibility)).collect();
         Ok((candidates, out.degeneracy()))
     });
     match solved.map_err(|error| errors::input(&error))? {
@@ -122,9 +132,11 @@ pub(crate) fn constraint_matrix<'py>(
 
 /// The rows of ``solvers()``.
 #[pyfunction]
-pub(crate) fn _solvers() -> Vec<(&'static str, usize, usize, &'static str)> {
-    let infos = SolverName::ALL.map(SolverName::info);
-    infos.iter().map(|i| (i.name, i.min_matches, i.max_candidates, i.reference)).collect()
+pub(crate) fn _solvers() -> Vec<(&'static str, usize, usize, &'static str, &'static str)> {
+    SolverName::named()
+        .map(SolverName::info)
+        .map(|i| (i.name, i.min_matches, i.max_candidates, i.reference, i.lost))
+        .collect()
 }
 
 pub(crate) fn solver_named(name: Option<&str>) -> PyResult<SolverName> {

@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import re
+import sys
 from importlib.metadata import requires, version
 from pathlib import Path
 
@@ -20,9 +21,10 @@ def test_numpy_is_all_it_needs() -> None:
 
 
 def test_examples() -> None:
-    result = doctest.testmod(qp)
-    assert result.attempted > 0
-    assert result.failed == 0
+    for module in qp, sys.modules["quest_pose._polynomials"]:
+        result = doctest.testmod(module)
+        assert result.attempted > 0
+        assert result.failed == 0
 
 
 def test_readme(capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,5 +54,7 @@ def test_everything_is_documented(name: str) -> None:
 
 
 def test_signature() -> None:
-    signature = '(x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all")'
+    signature = (
+        '(x1, x2, camera1=None, camera2=None, *, solver=None, kinds="all", feasibility="positive-depth")'
+    )
     assert str(inspect.signature(qp.solve)).replace("'", '"') == signature

@@ -14,13 +14,15 @@ forward).
 array([[0., 0., 1.]])
 
 ``estimate`` finds one pose from matches with outliers, ``estimate_batch`` those of many pairs on all cores, ``third_view``
-decides between two possible poses, ``solve`` finds the candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five. ``quest_pose.colmap`` verifies the
+decides between two possible poses, ``solve`` finds the candidate poses of five or more correct matches, ``solve_batch`` those of many samples of five, ``choose`` takes the candidates that a third view agrees with,
+and ``solve_polynomials`` finds every solution of a system of polynomials. ``quest_pose.paper`` has further pieces of the paper. ``quest_pose.colmap`` verifies the
 image pairs of COLMAP databases, ``quest_pose.compat`` takes the place of other libraries, ``quest_pose.arrow`` and
 ``quest_pose.dask`` work on columns and on clusters. What is wrong with points, cameras and options is a ``QuestError``, that matches have no
 answer a ``NoAnswer``; what is no array of numbers at all is a ``TypeError``.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +42,7 @@ from quest_pose._core import (
     ShapeMismatch,
     TooFewMatches,
     __version__,
+    _choose,
     _solve_batch,
     _solvers,
     _third_view,
@@ -48,17 +51,20 @@ from quest_pose._core import (
     estimate_batch,
     solve,
 )
+from quest_pose._polynomials import PolynomialSolutions, solve_polynomials
 
 __all__ = [
     "BadCamera",
     "Camera",
     "Candidate",
+    "Choice",
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
     "NoAnswer",
     "NoPose",
     "NotFinite",
+    "PolynomialSolutions",
     "QuestError",
     "RunnerUp",
     "ShapeMismatch",
@@ -67,11 +73,13 @@ __all__ = [
     "ThirdView",
     "TooFewMatches",
     "__version__",
+    "choose",
     "constraint_matrix",
     "estimate",
     "estimate_batch",
     "solve",
     "solve_batch",
+    "solve_polynomials",
     "solvers",
     "third_view",
 ]
@@ -88,6 +96,8 @@ class SolverInfo(NamedTuple):
     """The largest number of candidates, of all kinds."""
     reference: str
     """Where the method was published."""
+    lost: str = ""
+    """What the method as published is known to lose, counted; empty where it finds every pose of the tests."""
 
 
 def solvers() -> list[SolverInfo]:
@@ -96,7 +106,7 @@ def solvers() -> list[SolverInfo]:
     Returns
     -------
     list of SolverInfo
-        Named tuples of name, min_matches, max_candidates and reference.
+        Named tuples of name, min_matches, max_candidates, reference and lost.
     """
     return [SolverInfo(*row) for row in _solvers()]
 
@@ -218,3 +228,78 @@ def third_view(
     cameras = (camera1, camera2, camera3)
     first, second, decision = _third_view(x1, x2, x3, cameras, threshold, confidence, max_iterations, seed)
     return ThirdView(first, second, *(decision or (None, None, None)))
+
+
+class _Pose(Protocol):
+    """A ``Candidate``, an ``Estimate``, a ``RunnerUp``."""
+
+    @property
+    def R(self) -> NDArray[np.float64]: ...
+    @property
+    def t(self) -> NDArray[np.float64]: ...
+
+
+_Poses: TypeAlias = Sequence[_Pose | tuple[ArrayLike, ArrayLike]]
+
+
+class Choice(NamedTuple):
+    """The poses of two pairs of views whose depths agree best."""
+
+    pose_21: int
+    """The index of the pose from view 1 to view 2."""
+    pose_31: int
+    """The index of the pose from view 1 to view 3."""
+    disagreement: float
+    """How far the depths are apart: mean square over the points in units of the noise, at most nine."""
+    next_best: float
+    """The same for the best pair with another pose from view 1 to view 2; infinite if there is none."""
+    ratio: float
+    """The length of the translation to view 3 over that to view 2, in one common scale."""
+
+
+def choose(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    x3: ArrayLike,
+    poses_21: _Poses,
+    poses_31: _Poses,
+    camera1: Camera | ArrayLike | None = None,
+    camera2: Camera | ArrayLike | None = None,
+    camera3: Camera | ArrayLike | None = None,
+    *,
+    noise: float = 1e-3,
+) -> Choice | None:
+    """Of the candidate poses of two pairs of views the ones whose depths in view 1 agree.
+
+    Five points have several poses that fit exactly, and so has a plane. The depths in view 1 do not depend on where the
+    other camera is: the true candidates of views 1 and 2 and of views 1 and 3 give the same, up to one scale.
+
+    Parameters
+    ----------
+    x1, x2, x3 : array_like of shape (N, 2) or (N, 3)
+        The same N points in three views, as for ``solve``. Any number of points will do; five or more tell poses apart.
+    poses_21, poses_31 : sequence
+        The candidates of views 1 and 2 and of views 1 and 3: what ``solve`` returns, estimates, or pairs ``(R, t)``.
+    camera1, camera2, camera3 : Camera or array_like of shape (3, 3), optional
+        The cameras, or their matrices K. The second and the third are ``camera1`` where absent.
+    noise : float
+        The standard deviation of a bearing in radians: a pixel over the focal length.
+
+    Returns
+    -------
+    Choice or None
+        Named fields. A ``disagreement`` close to ``next_best`` does not decide. None where one of the lists is empty or
+        has no pose with a translation.
+
+    Raises
+    ------
+    NotFinite, ShapeMismatch, DegenerateInput, BadCamera, QuestError
+        As ``solve``; for a matrix that is no rotation, and a noise that is not positive.
+    """
+    cameras = (camera1, camera2, camera3)
+    choice = _choose(x1, x2, x3, _pairs(poses_21), _pairs(poses_31), cameras, noise)
+    return None if choice is None else Choice(*choice)
+
+
+def _pairs(poses: _Poses) -> list[tuple[ArrayLike, ArrayLike]]:
+    return [pose if isinstance(pose, tuple) else (pose.R, pose.t) for pose in poses]

@@ -26,17 +26,25 @@ __all__ = [
     "TooFewMatches",
     "__version__",
     "_candidate",
+    "_choose",
     "_colmap_export",
     "_colmap_read_pairs",
     "_colmap_verify",
     "_colmap_write",
+    "_columns",
     "_command",
     "_estimate",
     "_estimate_batch",
+    "_parallax",
+    "_rotation_metric",
     "_runner_up",
+    "_scene",
     "_solve_batch",
+    "_solve_polynomials",
     "_solvers",
     "_third_view",
+    "_translation_and_depths",
+    "_translation_metric",
     "constraint_matrix",
     "estimate",
     "estimate_batch",
@@ -143,6 +151,7 @@ def solve(
     *,
     solver: str | None = None,
     kinds: Literal["all", "exact", "planar"] = "all",
+    feasibility: Literal["positive-depth", "theorem-2"] = "positive-depth",
 ) -> list[Candidate]: ...
 @type_check_only
 class _RunnerUpDict(TypedDict):
@@ -359,7 +368,48 @@ def _solve_batch(
     x1: ArrayLike, x2: ArrayLike
 ) -> tuple[NDArray[np.int64], _Array, _Array, NDArray[np.int64], _Array]: ...
 def _candidate(state: tuple[Any, ...]) -> Candidate: ...
-def _solvers() -> list[tuple[str, int, int, str]]: ...
+def _solvers() -> list[tuple[str, int, int, str, str]]: ...
+def _choose(
+    x1: ArrayLike,
+    x2: ArrayLike,
+    x3: ArrayLike,
+    poses_21: Sequence[tuple[ArrayLike, ArrayLike]],
+    poses_31: Sequence[tuple[ArrayLike, ArrayLike]],
+    cameras: tuple[_AnyCamera, _AnyCamera, _AnyCamera],
+    noise: float,
+) -> tuple[int, int, float, float, float] | None: ...
+def _solve_polynomials(
+    unknowns: int,
+    equations: Sequence[Sequence[tuple[float, Sequence[int]]]],
+    solutions: int | None,
+    max_rounds: int,
+    max_monomials: int,
+    seed: int,
+) -> tuple[list[list[float]], list[list[float]], list[float], list[int], list[bool], int, dict[str, Any]]: ...
+def _translation_and_depths(
+    r: ArrayLike,
+    x1: ArrayLike,
+    x2: ArrayLike,
+    camera1: _AnyCamera,
+    camera2: _AnyCamera,
+) -> tuple[list[float], list[float], list[float], float, int]: ...
+def _rotation_metric(r: ArrayLike, r_est: ArrayLike) -> float: ...
+def _translation_metric(t: ArrayLike, t_est: ArrayLike) -> float: ...
+def _parallax(t: ArrayLike, depths1: ArrayLike, depths2: ArrayLike) -> float: ...
+def _columns() -> tuple[list[str], list[float]]: ...
+def _scene(
+    points: int,
+    layout: str,
+    motion: str,
+    parallax: float | None,
+    max_angle: float | None,
+    view: str,
+    noise_px: float,
+    rounded: bool,
+    boxes: tuple[list[object], list[object]],
+    seed: int,
+    index: int,
+) -> tuple[_Array, _Array, _Array, list[float], _Array]: ...
 
 @final
 class Command:
