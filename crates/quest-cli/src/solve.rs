@@ -200,13 +200,21 @@ fn at_least(pair: &Pair, needed: usize) -> Result<Vec<Correspondence>, ReadError
     Ok(matches)
 }
 
+/// Among more matches than that some are likely wrong.
+const OUTLIERS: usize = 20;
+
 /// Says why no candidate of a solver is shown.
 pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
     let why = match (found.iter().map(|c| c.in_front).max(), found.degeneracy()) {
         (Some(most), _) => format!(
             "none of the {} candidates has all {matches} points in front of both cameras, the best has {most}; --all \
-             lists them",
-            found.len()
+             lists them{}",
+            found.len(),
+            if matches > OUTLIERS {
+                "; matches with outliers: quest-cli estimate, quest-cli view --estimate"
+            } else {
+                ""
+            }
         ),
         (None, Some(degeneracy)) => degeneracy.to_string(),
         (None, None) => "the solver found no candidate".to_owned(),

@@ -1,5 +1,6 @@
 //! `quest-cli view`: a page that shows one pair in three dimensions.
 
+mod estimated;
 mod page;
 mod scene;
 
@@ -8,6 +9,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quest_core::{
     Candidate, Candidates,
+    robust::Options,
     solver::{Kinds, SolverName},
 };
 use quest_io::{Output, Pair, SolveRecord};
@@ -18,9 +20,11 @@ const EXAMPLES: &str = "\
 Examples:
   quest-cli view examples/points.json -o view.html
   quest-cli view examples/tiny_berlin_7in.json --all -o view.html
+  quest-cli view examples/tumfr3_98072_98172.json --estimate -o view.html    matches with outliers
 
 The page shows both cameras, the rays, the points at their depths in the frame of camera 1, and the
-residuals. Each candidate can be switched on and off. The page is one file of 5 MB that works without
+residuals. Each candidate can be switched on and off. With --estimate it shows one pose as `quest-cli
+estimate` finds it: inliers and outliers over both images, cameras and points, the second pose. The page is one file of 5 MB that works without
 a network. It reads the files that `quest-cli solve` and `estimate` read, but not their results,
 which have no matches. JSON Lines show their first pair.
 
@@ -39,8 +43,15 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
     /// Also show the candidates that have points behind a camera.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "estimate")]
     all: bool,
+    /// Show one pose from matches with outliers, as `quest-cli estimate` finds it.
+    #[arg(long)]
+    estimate: bool,
+    /// Matches with a Sampson error below this are inliers: in pixels, 1 by default; without cameras in units of the plane z = 1,
+    /// where it has to be given.
+    #[arg(long, value_name = "PX", allow_negative_numbers = true, requires = "estimate")]
+    threshold: Option<f64>,
     /// Write only errors, and why there is no pose, to standard error.
     #[arg(long)]
     quiet: bool,
@@ -66,6 +77,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if input.is_lines() && !arguments.quiet && input.next()?.is_some() {
         words::say("note", &format!("{}: only this pair is shown", pair.place));
     }
+    if arguments.estimate {
+        let Some(html) = estimated::html(&pair, &arguments.options(&pair)?)? else {
+            return Ok(Outcome::NoPose);
+        };
+        output.write(|w| w.write_all(html.as_bytes()))?;
+        output.finish()?;
+        return Ok(Outcome::Answer);
+    }
     let matches = solve::enough_matches(&pair, arguments.solver)?;
     let info = arguments.solver.info();
     let mut found = Candidates::new();
@@ -85,4 +104,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     output.write(|w| w.write_all(html.as_bytes()))?;
     output.finish()?;
     Ok(Outcome::Answer)
+}
+
+impl Arguments {
+    /// The options of an estimate.
+    fn options(&self, pair: &Pair) -> Result<Options, Failure> {
+        let options = Options { solver: self.solver, ..Options::default() };
+        match (&pair.cameras, self.threshold) {
+            (Some([camera1, camera2]), threshold) => {
+                Ok(Options { threshold: threshold.unwrap_or(1.0), ..options.with_cameras(camera1, camera2) })
+            }
+            (None, Some(threshold)) => Ok(Options { threshold, ..options }),
+            (None, None) => Err(Failure::Arguments(format!(
+                "{}: found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1",
+                pair.place
+            ))),
+        }
+    }
 }

@@ -2,13 +2,14 @@
 
 use nalgebra::Vector3;
 use quest_core::{Candidate, Correspondence, RelativePose};
+use quest_io::Pair;
 use quest_plot::{Colour, Part, Space, colour};
 
 use super::{Solved, page};
 
 /// The largest distance of a drawn point. Farther points would make everything else small, so only their rays are drawn.
-const FARTHEST: f64 = 8.0;
-const CAMERA_1: &str = "camera 1";
+pub(super) const FARTHEST: f64 = 8.0;
+pub(super) const CAMERA_1: &str = "camera 1";
 const TRUTH: &str = "true camera 2";
 /// The depth of the image in a drawn camera.
 const FRUSTUM: f64 = 0.12;
@@ -17,7 +18,7 @@ const HALF_IMAGE: [f64; 2] = [0.5, 0.375];
 
 /// Both cameras, and every candidate with its rays and points. The first candidate is switched on.
 pub(super) fn space(solved: &Solved) -> Space {
-    let camera1 = camera(CAMERA_1, colour::INK, &RelativePose::identity(), corners(solved, 0), true);
+    let camera1 = camera(CAMERA_1, colour::INK, &RelativePose::identity(), corners(solved.pair, 0), true);
     let mut space = Space::of_camera("Cameras and points").with(camera1);
     space.axes = ["x1, mean depths", "y1", "z1"].map(str::to_owned);
     space.caption.push_str(
@@ -31,24 +32,24 @@ pub(super) fn space(solved: &Solved) -> Space {
         space = space
             .with(rays(&name, colour, pose, &solved.matches, index == 0))
             .with(points(&name, colour, solved, candidate, index == 0))
-            .with(camera(&name, colour, pose, corners(solved, 1), index == 0));
+            .with(camera(&name, colour, pose, corners(solved.pair, 1), index == 0));
     }
     match (solved.pair.truth.q_21, solved.pair.truth.t_21.and_then(|t| t.try_normalize(0.0))) {
         (Some(q_21), Some(direction)) => {
             // The truth has a scale of its own.
             let length = solved.candidates.first().map_or(1.0, |c| c.pose.t_21.norm());
             let pose = RelativePose::new(q_21, length * direction);
-            space.with(camera(TRUTH, colour::MUTED, &pose, corners(solved, 1), true))
+            space.with(camera(TRUTH, colour::MUTED, &pose, corners(solved.pair, 1), true))
         }
         _ => space,
     }
 }
 
 /// The corners of an image on the plane `z = 1`.
-fn corners(solved: &Solved, view: usize) -> [[f64; 2]; 4] {
+pub(super) fn corners(pair: &Pair, view: usize) -> [[f64; 2]; 4] {
     let unknown = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
         .map(|[x, y]| [x * HALF_IMAGE[0], y * HALF_IMAGE[1]]);
-    let Some(camera) = solved.pair.cameras.map(|cameras| cameras[view]) else { return unknown };
+    let Some(camera) = pair.cameras.map(|cameras| cameras[view]) else { return unknown };
     let Some((width, height)) = camera.size() else { return unknown };
     let (width, height) = (f64::from(width), f64::from(height));
     let pixels = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
@@ -61,7 +62,13 @@ fn corners(solved: &Solved, view: usize) -> [[f64; 2]; 4] {
 }
 
 /// The pyramid of a camera, with its name at the top.
-fn camera(name: &str, colour: Colour, pose: &RelativePose, corners: [[f64; 2]; 4], is_shown: bool) -> Part {
+pub(super) fn camera(
+    name: &str,
+    colour: Colour,
+    pose: &RelativePose,
+    corners: [[f64; 2]; 4],
+    is_shown: bool,
+) -> Part {
     let world = pose.inverse();
     let at = |x: [f64; 3]| -> [f64; 3] { (world.q_21 * Vector3::from(x) + world.t_21).into() };
     let centre = at([0.0; 3]);
@@ -80,7 +87,7 @@ fn camera(name: &str, colour: Colour, pose: &RelativePose, corners: [[f64; 2]; 4
 
 /// Where the two rays of a match come closest: the point on the ray of camera 1, and the point on the ray of camera 2, both in
 /// the frame of camera 1. `None` if no depth is determined.
-fn ends(pose: &RelativePose, m: &Correspondence) -> Option<[Vector3<f64>; 2]> {
+pub(super) fn ends(pose: &RelativePose, m: &Correspondence) -> Option<[Vector3<f64>; 2]> {
     let (z1, z2) = pose.depths(m)?;
     let x2 = m.bearing2() * (z2 * m.length2());
     Some([m.bearing1() * (z1 * m.length1()), pose.q_21.inverse() * (x2 - pose.t_21)])

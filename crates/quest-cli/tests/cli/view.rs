@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use crate::{example, run, run_in};
+use crate::{directory_with, example, run, run_in};
 
 /// What a browser has to say of a page that is no fault of the page: how WebGL is emulated, and a hint at speed.
 const HARMLESS: [&str; 3] =
@@ -76,6 +76,44 @@ fn a_pair_becomes_a_page() {
         let candidates = ours.split("<tbody>").nth(1).unwrap().matches("<tr>").count();
         assert!(candidates > 1 && !ours.contains("NaN"));
     }
+}
+
+#[test]
+fn an_estimate_becomes_a_page() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, model) in [("tumfr3_98072_98172.json", "general"), ("hololens_00011_00015.json", "planar")] {
+        let given = example(name);
+        let refused = run_in(directory.path(), &["view", &given, "--quiet", "-o", "view.html"], b"");
+        assert_eq!(refused.status, 1);
+        assert!(refused.stderr.contains("quest-cli view --estimate"), "{}", refused.stderr);
+        let found =
+            run_in(directory.path(), &["view", &given, "--estimate", "--quiet", "-o", "view.html"], b"");
+        assert_eq!((found.status, found.stdout.as_str(), found.stderr.as_str()), (0, "", ""));
+        let html = fs::read_to_string(directory.path().join("view.html")).unwrap();
+        let ours = &html[html.find("<h1>").unwrap()..];
+        let printed = run(&["estimate", &given, "--format", "json", "--quiet"]).stdout;
+        let estimate: serde_json::Value = serde_json::from_str(&printed).unwrap();
+        let count =
+            format!("{} of {}", estimate["inlier_count"], estimate["inliers"].as_array().unwrap().len());
+        for words in [&count, model, "outliers", "camera 1", "Matches over both images"] {
+            assert!(ours.contains(words), "{name}: {words}");
+        }
+        assert_eq!(ours.contains("second pose"), !estimate["runner_up"].is_null());
+    }
+    let directory = directory_with("plane.csv", "x1,y1,x2,y2\n0,0,0,0\n");
+    let found = run_in(directory.path(), &["view", "plane.csv", "--estimate", "-o", "view.html"], b"");
+    assert_eq!(found.status, 2);
+    assert!(run(&["view", "a.json", "--threshold", "1", "-o", "b.html"]).stderr.contains("--estimate"));
+}
+
+#[test]
+#[ignore = "needs Chromium; scripts/test runs it"]
+fn an_estimate_is_shown_in_a_browser() {
+    let directory = tempfile::tempdir().unwrap();
+    let given = example("hololens_00011_00015.json");
+    let found = run_in(directory.path(), &["view", &given, "--estimate", "--quiet", "-o", "view.html"], b"");
+    assert_eq!(found.status, 0, "{}", found.stderr);
+    assert!(opened(&directory.path().join("view.html")).starts_with("4 plots"));
 }
 
 #[test]
