@@ -84,7 +84,7 @@ impl BatchSolver {
 
     /// The same for a robust loop, which wants poses and does not ask whether a sample is complete: of its essential matrices those
     /// alone that have a pose with all five points in front of both cameras, as far as that is clear of noise, and roots that
-    /// are counted once. Of the matrices of false matches one in ten is left.
+    /// are counted once. One in ten of the matrices of false matches is left.
     pub(crate) fn solve_oriented(
         self,
         matches: &[Correspondence],

@@ -68,6 +68,7 @@ mod test;
 pub use crate::algebra::vectors::instructions::Instructions;
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
+pub(crate) use score::WithLoss;
 pub use score::{
     BearingMatches, ImageMatches, MatchColumns, Real, Score, Scorer, SearchScore, Stop, UnknownLoss,
 };

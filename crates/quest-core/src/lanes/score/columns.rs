@@ -203,7 +203,7 @@ impl<T: Real, const N: usize> Columns<T, N> {
     }
 }
 
-/// Of points `(x, y)` and `(u, v)`.
+/// The constraint of points `(x, y)` and `(u, v)`.
 #[inline(always)]
 fn on_plane<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, u, v]: [F<L, T>; 4]) -> (F<L, T>, F<L, T>) {
     let line2 = [
@@ -218,7 +218,7 @@ fn on_plane<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, u, v]: [F<L, T>; 4]) -> (F<
     (r, gradient1 + gradient2)
 }
 
-/// Of bearings `(x, y, z)` and `(u, v, w)`.
+/// The constraint of bearings `(x, y, z)` and `(u, v, w)`.
 #[inline(always)]
 fn on_sphere<T, L: Lanes<T>>(e: &[F<L, T>; 9], [x, y, z, u, v, w]: [F<L, T>; 6]) -> (F<L, T>, F<L, T>) {
     let plane2 = [

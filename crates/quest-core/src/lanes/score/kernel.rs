@@ -1,6 +1,7 @@
 //! The loops over all matches.
 
 use super::columns::{BLOCK, Kernel, MatchColumns, Real};
+use super::search_score::{WithWorth, Worth};
 use super::{Score, SearchScore, Stop};
 use crate::algebra::vectors::lane::{F, Float, Lanes, MAX_LANES};
 
@@ -18,23 +19,29 @@ impl<T: Real, C: MatchColumns<T>> Kernel<T> for Sum<'_, T, C> {
 
     #[inline(always)]
     fn run<L: Lanes<T>>(self, lanes: L) -> Score {
-        match self.loss {
-            SearchScore::Truncated => self.sum::<L, Truncated>(lanes),
-            SearchScore::Marginalised => self.sum::<L, Marginalised>(lanes),
-        }
+        self.loss.run_vectors(Summing { sum: &self, lanes })
     }
 }
 
-impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
+/// A score with these instructions.
+struct Summing<'a, T, C, L> {
+    sum: &'a Sum<'a, T, C>,
+    lanes: L,
+}
+
+impl<T: Real, C: MatchColumns<T>, L: Lanes<T>> WithWorth for Summing<'_, T, C, L> {
+    type Output = Score;
+
     #[inline(always)]
-    fn sum<L: Lanes<T>, W: Worth>(&self, lanes: L) -> Score {
+    fn run<W: Worth>(self) -> Score {
+        let Self { sum: of, lanes } = self;
         let zero = lanes.splat(T::from_f64(0.0));
-        let square = self.threshold * self.threshold;
-        let (threshold, limit) = (lanes.splat(T::from_f64(self.threshold)), lanes.splat(T::from_f64(square)));
-        let e = splat::<T, L>(lanes, &self.e);
-        let (all, inverse) = (self.matches.len(), 1.0 / square);
+        let square = of.threshold * of.threshold;
+        let (threshold, limit) = (lanes.splat(T::from_f64(of.threshold)), lanes.splat(T::from_f64(square)));
+        let e = splat::<T, L>(lanes, &of.e);
+        let (all, inverse) = (of.matches.len(), 1.0 / square);
         let mut score = Score { sum: 0.0, visited: 0 };
-        for block in self.matches.blocks() {
+        for block in of.matches.blocks() {
             let mut sum = zero;
             for k in 0..BLOCK / L::COUNT {
                 let (error, gradient) = C::constraint(lanes, &e, block, k * L::COUNT);
@@ -44,39 +51,11 @@ impl<T: Real, C: MatchColumns<T>> Sum<'_, T, C> {
             }
             score.sum += sum.sum().into() * inverse;
             score.visited = all.min(score.visited + BLOCK);
-            if self.stop.is_reached(score.sum, score.visited, all) {
+            if of.stop.is_reached(score.sum, score.visited, all) {
                 break;
             }
         }
         score
-    }
-}
-
-/// What an inlier counts, by the threshold `T`, its error `e` and the square of its gradient `g²`, with `T u = e/g`.
-///
-/// Not a function that is handed over: what calls such a one may be compiled for the instructions that every processor has.
-trait Worth {
-    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V;
-}
-
-/// `T² (1 − u²)`.
-struct Truncated;
-
-/// `T² (1 − u)²`.
-struct Marginalised;
-
-impl Worth for Truncated {
-    #[inline(always)]
-    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V {
-        threshold * threshold - error * error / square_gradient
-    }
-}
-
-impl Worth for Marginalised {
-    #[inline(always)]
-    fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V {
-        let rest = threshold - error.abs() * square_gradient.inverse_sqrt();
-        rest * rest
     }
 }
 

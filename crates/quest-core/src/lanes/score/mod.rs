@@ -1,13 +1,7 @@
 //! The score of an essential matrix over many matches, and its inliers.
 //!
-//! With `r` the Sampson error of a match and `T` the threshold, a match is an inlier where `r < T`, and counts
-//!
-//! ```text
-//! 1 − (r/T)²     SearchScore::Truncated         MSAC
-//! (1 − r/T)²     SearchScore::Marginalised      MSAC, averaged over all thresholds up to T
-//! ```
-//!
-//! and nothing elsewhere. On image planes, with the points `x1 = (u1, v1, 1)`, `x2 = (u2, v2, 1)`,
+//! With `r` the Sampson error of a match and `T` the threshold, a match is an inlier where `r < T`. What it then counts is its
+//! [`SearchScore`]; elsewhere it counts nothing. On image planes, with the points `x1 = (u1, v1, 1)`, `x2 = (u2, v2, 1)`,
 //!
 //! ```text
 //! r² = (x2ᵀ E x1)² / ((E x1)_1² + (E x1)_2² + (Eᵀ x2)_1² + (Eᵀ x2)_2²)
@@ -24,61 +18,18 @@
 
 mod columns;
 mod kernel;
-
-use std::str::FromStr;
+mod search_score;
 
 pub use columns::{BearingMatches, ImageMatches, MatchColumns, Real};
+#[expect(deprecated, reason = "the old name stays for one version")]
+pub use search_score::Loss;
+pub(crate) use search_score::WithLoss;
+pub use search_score::{SearchScore, UnknownLoss};
 
 use columns::BLOCK;
 use kernel::{Inliers, Sum};
 
 use crate::algebra::vectors::instructions::{Instructions, Token};
-
-/// What a match within the threshold counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum SearchScore {
-    /// `1 − (r/T)²`.
-    Truncated,
-    /// `(1 − r/T)²`.
-    #[default]
-    Marginalised,
-}
-
-impl SearchScore {
-    /// Every choice, the default first.
-    pub const CHOICES: [Self; 2] = [Self::Marginalised, Self::Truncated];
-
-    /// The name on the command line, in Python and in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Truncated => "truncated",
-            Self::Marginalised => "marginalised",
-        }
-    }
-}
-
-/// The name of [`SearchScore`] before version 0.2.
-#[deprecated(since = "0.2.0", note = "it is called `SearchScore` now")]
-pub type Loss = SearchScore;
-
-/// No search score has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("loss is {found:?}, expected one of {}", SearchScore::CHOICES.map(SearchScore::name).join(", "))]
-pub struct UnknownLoss {
-    /// The name that was asked for.
-    pub found: String,
-}
-
-impl FromStr for SearchScore {
-    type Err = UnknownLoss;
-
-    fn from_str(name: &str) -> Result<Self, UnknownLoss> {
-        let found = Self::CHOICES.into_iter().find(|loss| loss.name() == name);
-        found.ok_or_else(|| UnknownLoss { found: name.to_owned() })
-    }
-}
 
 /// When the matches that are left are not looked at any more. Asked after every 64 matches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -184,10 +135,7 @@ mod tests {
 
     /// The score as the head of the module defines it.
     fn defined(errors: &[f64], threshold: f64, loss: SearchScore) -> f64 {
-        let count = |r: &f64| match loss {
-            SearchScore::Truncated => 1.0 - (r / threshold).powi(2),
-            SearchScore::Marginalised => (1.0 - r / threshold).powi(2),
-        };
+        let count = |r: &f64| 1.0 - loss.loss(r / threshold);
         errors.iter().filter(|r| **r < threshold).map(count).sum()
     }
 
@@ -215,7 +163,7 @@ mod tests {
         let threshold = 1e-3;
         for instructions in available() {
             let scorer = Scorer::with_instructions(instructions).unwrap();
-            for loss in [SearchScore::Truncated, SearchScore::Marginalised] {
+            for loss in SearchScore::CHOICES {
                 let plane = defined(&on_plane, threshold, loss);
                 let sphere = defined(&on_sphere, threshold, loss);
                 assert!(plane > 20.0 && plane < 120.0, "the threshold has to part the matches");

@@ -1,7 +1,7 @@
 //! The ten cubics reduced to six rows by Householder reflections.
 //!
 //! Gauss–Jordan elimination with pivoting would choose other rows in every lane; reflections need no choice and are more
-//! accurate. Of the reduced matrix only the rows led by `x²z, x²w, y²z, y²w, xyz, xyw` are used, so that back substitution
+//! accurate. Only the rows of the reduced matrix that are led by `x²z, x²w, y²z, y²w, xyz, xyw` are used, so that back substitution
 //! stops there.
 //!
 //! A reflection waits for the square root and the division that make it. So the next one is begun first, with the column

@@ -3,11 +3,11 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::algebra::vectors::widest::{Work, widest};
-use crate::lanes::SearchScore;
+use crate::lanes::{SearchScore, WithLoss};
 use crate::robust::data::columns::{POSES, Residuals, is_in_front};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::loss::CAP;
-use crate::robust::search::search_score::{MANY, REACH, cost};
+use crate::robust::search::search_score::{MANY, REACH};
 use crate::solver::shared::essential::decompose;
 use crate::solver::shared::motion::Motion;
 
@@ -172,17 +172,16 @@ impl Work for Judging<'_> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        match self.loss {
-            SearchScore::Truncated => self.sum(|u| cost(SearchScore::Truncated, u)),
-            SearchScore::Marginalised => self.sum(|u| cost(SearchScore::Marginalised, u)),
-        }
+        self.loss.run(self)
     }
 }
 
-impl Judging<'_> {
+impl WithLoss for Judging<'_> {
+    type Output = f64;
+
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
-    fn sum(self, cost: impl Fn(f64) -> f64) -> f64 {
+    fn run(self, cost: impl Fn(f64) -> f64) -> f64 {
         let Self { residuals: of, pose, inverse_reach, judged, .. } = self;
         let mut sum = [0.0; WIDTH];
         let (residuals, last_residuals) = of.values.as_chunks::<WIDTH>();

@@ -1,14 +1,6 @@
 //! How well a motion explains all matches: one number, zero for perfect and one a match at worst.
 //!
-//! The loss of a residual `r` is one of
-//!
-//! ```text
-//! ρ(u) = 2u − u²    marginalised        ρ(u) = u²    truncated,        u = min(|r| / T, 1)
-//! ```
-//!
-//! The first is the second averaged over all thresholds up to `T`, so that it does not hang on one of them (the idea of MAGSAC:
-//! D. Barath, J. Matas, J. Noskova, CVPR 2019, in one dimension). The second is that of MSAC (P. H. S. Torr, A. Zisserman,
-//! *MLESAC*, CVIU 2000).
+//! The loss `ρ(u)` of a residual `r` is that of the [`SearchScore`], with `u = min(|r| / T, 1)`.
 
 use nalgebra::Matrix3;
 
@@ -20,21 +12,12 @@ use crate::robust::refine::epipolar::fundamental;
 /// The loss reaches one at this multiple of the inlier threshold.
 pub(crate) const REACH: f64 = 2.5;
 
-/// The mean score of a match that a hypothesis has to be likely to reach, where none is known yet.
+/// The mean score of a match that a hypothesis must be likely to reach while no other hypothesis is known.
 const LEAST_MEAN: f64 = 0.03;
 
 /// With fewer matches the loss is the truncated square: of eight matches five are fitted by any motion, and what is left must
 /// not be rewarded for being small.
 pub(crate) const MANY: usize = 10;
-
-/// The loss of a residual in units of the reach.
-pub(crate) fn cost(loss: SearchScore, u: f64) -> f64 {
-    let u = u.abs().min(1.0);
-    match loss {
-        SearchScore::Truncated => u * u,
-        SearchScore::Marginalised => u * (2.0 - u),
-    }
-}
 
 /// The matches as the kernels take them.
 #[derive(Debug)]
@@ -92,26 +75,5 @@ impl<'a> Scorer<'a> {
         };
         let loss = count - score.sum;
         (score.visited == self.observations.len() && loss < best).then_some(loss)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_number_and_the_vectors_have_the_same_formula() {
-        // A shift along x takes a point to its line y2 = y1; the residual is half of the difference, in both views.
-        let e = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0];
-        let kernel = lanes::Scorer::new();
-        for kind in SearchScore::CHOICES {
-            for k in 0..=120 {
-                let u = f64::from(k) / 100.0;
-                let mut matches = ImageMatches::<f64>::new();
-                matches.push([0.1, 0.2], [0.4, 0.2 + u * 2.0_f64.sqrt() * 1e-3]);
-                let found = kernel.score(&matches, &e, 1e-3, kind, Stop::Never);
-                assert!((1.0 - found.sum - cost(kind, u)).abs() < 1e-9, "{kind:?} {u}: {found:?}");
-            }
-        }
     }
 }
