@@ -3,7 +3,7 @@
 /// The places of the features in the first images, until there are enough to average them.
 #[derive(Clone, Debug)]
 pub(crate) struct FirstImages {
-    /// Of each feature: so many places that are set, in a list long enough for all.
+    /// For each feature, how many places are set in a list that is long enough for all.
     places: Vec<(usize, Vec<[f64; 2]>)>,
     seen: usize,
     wanted: usize,
@@ -23,7 +23,7 @@ impl FirstImages {
 
     /// Adds an image. With the last of them it becomes the mean of all, and true is returned.
     ///
-    /// Of a feature the places within `reach` of their median count; it has to be seen in more than half of the images.
+    /// The mean is taken over a feature's places within `reach` of their median. The feature must be seen in more than half of the images.
     pub(crate) fn average(&mut self, image: &mut [Option<[f64; 2]>], reach: f64) -> bool {
         for ((count, places), seen) in self.places.iter_mut().zip(&*image) {
             if let (Some(seen), Some(place)) = (seen, places.get_mut(*count)) {

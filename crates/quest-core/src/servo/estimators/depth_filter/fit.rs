@@ -42,9 +42,9 @@ const SCHEDULE: Schedule = Schedule {
 /// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Of the tilt, in radians.
+    /// The deviation of the tilt, in radians.
     pub tilt: f64,
-    /// Of the height, in the unit of t.
+    /// The deviation of the height, in the unit of t.
     pub height: f64,
 }
 
@@ -111,7 +111,7 @@ impl Workspace {
         }
     }
 
-    /// Fits from this pose and these inverse depths, by at most so many steps.
+    /// Fits from this pose and these inverse depths, by at most `most_steps` steps.
     pub(crate) fn fit(
         &mut self,
         problem: &Problem<'_>,

@@ -24,10 +24,10 @@ pub struct FilterOptions {
     pub largest_turn: f64,
     /// The largest change of t from one image to the next, in the unit of the goal's depths.
     pub largest_move: f64,
-    /// The first so many images are averaged before the camera is told to move: the depths of the first pair decide the
-    /// way, and the noise of these images can still be averaged away.
+    /// The number of images that are averaged before the camera is told to move. The depths of the first pair decide the way, and the
+    /// noise of these images can still be averaged away.
     pub first_images: usize,
-    /// After so many images without a pose the candidates are asked again. That takes several images too.
+    /// The number of images without a pose after which the candidates are asked again. That takes several images too.
     pub patience: usize,
     /// For a robot that moves on a plane with a level camera: how exactly.
     pub plane: Option<Plane>,

@@ -45,6 +45,14 @@ impl DepthReference {
         row.iter().zip(off).map(|(w, off)| w * off).sum()
     }
 
+    /// How exactly each depth is known, relative to it: one standard deviation.
+    pub(crate) fn precisions(&self) -> impl Iterator<Item = f64> {
+        let n = self.len();
+        self.inverse_depths.iter().enumerate().map(move |(i, rho)| {
+            self.information[i * n + i].max(f64::MIN_POSITIVE).sqrt().recip() / rho.abs().max(1e-3)
+        })
+    }
+
     /// Scales the inverse depths to a mean of 1.
     pub(crate) fn normalise(&mut self) {
         let mean = self.inverse_depths.iter().sum::<f64>() / self.len() as f64;

@@ -5,29 +5,27 @@
 
 use nalgebra::Vector3;
 
-use crate::servo::estimators::depth_filter::fit::{Fitted, MAX_STEPS, Problem};
-use crate::servo::estimators::depth_filter::{DepthFilter, Hypothesis, MAX_HYPOTHESES, MOST_OF_ONE_IMAGE};
+use crate::servo::estimators::depth_filter::fit::Fitted;
+use crate::servo::estimators::depth_filter::hypotheses::Hypotheses;
+use crate::servo::estimators::depth_filter::setting::{Image, Setting};
 use crate::servo::estimators::estimate::HoldReason;
 use crate::servo::estimators::source::PoseSource;
-use crate::{Candidate, CandidateKind, Correspondence, RelativePose};
+use crate::{Candidate, CandidateKind, Candidates, Correspondence, RelativePose};
 
-/// With so many steps of fits in an image no further fit is begun.
+/// No further fit is begun once the fits of an image have taken this many steps: about two fits from candidates, of seven steps each.
 const STEPS_AN_IMAGE: usize = 16;
-/// The candidates take as long as about so many steps.
+/// The solve takes about as long as this many steps.
 const STEPS_OF_A_SOLVE: usize = 10;
-/// Two images that show the same features were taken in about the same direction: one standard deviation, in radians. It orders
-/// the answers to the first image where nothing else tells them apart.
-const LIKELY_TURN: f64 = 1.0;
 
 /// A search among the candidates of one image.
 #[derive(Clone, Debug)]
-pub(crate) struct Search {
+pub(super) struct Search {
     stage: Stage,
     /// The candidate that is next.
     next: usize,
-    /// The image, and the noise of its difference from the goal.
-    frame: Vec<Option<[f64; 2]>>,
-    sigma: f64,
+    image: Image,
+    matches: Vec<Correspondence>,
+    candidates: Candidates,
     /// The best fit with the old depths.
     best: Option<Fitted>,
     /// The inverse depths of a candidate.
@@ -45,136 +43,114 @@ enum Stage {
 }
 
 impl Search {
-    pub(crate) fn new(features: usize) -> Self {
+    pub(super) fn new(features: usize) -> Self {
         Self {
             stage: Stage::Idle,
             next: 0,
-            frame: vec![None; features],
-            sigma: 0.0,
+            image: Image::new(features),
+            matches: Vec::with_capacity(features),
+            candidates: Candidates::new(),
             best: None,
             proposed: vec![1.0; features],
         }
     }
 
-    pub(crate) fn is_running(&self) -> bool {
+    pub(super) fn is_running(&self) -> bool {
         self.stage != Stage::Idle
     }
-}
 
-impl<S: PoseSource> DepthFilter<S> {
-    /// Begins a search or goes on with it, for as long as one image may take.
-    pub(crate) fn go_on_searching(&mut self) -> Result<(), HoldReason> {
-        let mut steps = 0;
-        if self.search.is_running() {
-            self.frame.copy_from_slice(&self.search.frame);
-            self.sigma = self.search.sigma;
-        } else {
-            self.begin_search()?;
-            steps = STEPS_OF_A_SOLVE;
-        }
-        while self.search.is_running() && steps < STEPS_AN_IMAGE {
-            let next = self.search.next;
-            self.search.next += 1;
-            match (self.search.stage, next < self.candidates.len()) {
-                (Stage::OldDepths, true) => steps += self.try_old_depths(next),
-                (Stage::OldDepths, false) => self.end_with_old_depths(),
-                (_, true) => steps += self.try_own_depths(next),
-                (_, false) => return self.end_with_own_depths(),
-            }
-        }
-        Ok(())
+    pub(super) fn stop(&mut self) {
+        self.stage = Stage::Idle;
     }
 
-    /// The first search takes the mean of the first images, a later one the current image.
-    fn begin_search(&mut self) -> Result<(), HoldReason> {
-        let mut images = 1;
-        if self.count == 0 {
-            images = self.options.first_images;
-            let reach = self.options.gate * self.options.noise;
-            if !self.first_images.average(&mut self.frame, reach) {
-                return Err(HoldReason::Starting);
-            }
-            if self.seen() < self.options.min_features {
-                return Err(HoldReason::TooFewFeatures);
-            }
-        }
-        self.sigma = self.sigma_of_mean(images);
-        self.solve()?;
-        self.search.frame.copy_from_slice(&self.frame);
-        (self.search.sigma, self.search.next, self.search.best) = (self.sigma, 0, None);
-        self.search.stage = if self.count == 0 { Stage::OwnDepths } else { Stage::OldDepths };
-        Ok(())
-    }
-
-    /// The candidates of this image.
-    fn solve(&mut self) -> Result<(), HoldReason> {
+    /// Begins with the candidates of an image. Where there is a hypothesis its depths are tried first.
+    pub(super) fn begin(
+        &mut self,
+        image: &Image,
+        source: &mut impl PoseSource,
+        setting: &Setting,
+        has_depths: bool,
+    ) -> Result<(), HoldReason> {
         self.matches.clear();
-        for (goal, image) in self.goal.iter().zip(&self.frame) {
+        for (goal, image) in setting.goal.iter().zip(&image.frame) {
             let Some(image) = image else { continue };
             if let Ok(m) = Correspondence::from_image_points(*goal, *image) {
                 self.matches.push(m);
             }
         }
-        if self.matches.len() < self.source.min_matches() {
+        if self.matches.len() < source.min_matches() {
             return Err(HoldReason::TooFewFeatures);
         }
-        self.source.candidates(&self.matches, &mut self.candidates);
-        if self.candidates.is_empty() { Err(HoldReason::Degenerate) } else { Ok(()) }
+        source.candidates(&self.matches, &mut self.candidates);
+        if self.candidates.is_empty() {
+            return Err(HoldReason::Degenerate);
+        }
+        self.image.frame.copy_from_slice(&image.frame);
+        self.image.sigma = image.sigma;
+        (self.next, self.best) = (0, None);
+        self.stage = if has_depths { Stage::OldDepths } else { Stage::OwnDepths };
+        Ok(())
+    }
+
+    /// Goes on for as long as one image may take. A search that is new has taken the time of its solve already.
+    pub(super) fn go_on(
+        &mut self,
+        hypotheses: &mut Hypotheses,
+        setting: &Setting,
+        is_new: bool,
+    ) -> Result<(), HoldReason> {
+        let mut steps = if is_new { STEPS_OF_A_SOLVE } else { 0 };
+        while self.is_running() && steps < STEPS_AN_IMAGE {
+            let next = self.next;
+            self.next += 1;
+            match (self.stage, next < self.candidates.len()) {
+                (Stage::OldDepths, true) => steps += self.try_old_depths(next, hypotheses, setting),
+                (Stage::OldDepths, false) => self.end_with_old_depths(hypotheses, setting),
+                (_, true) => steps += self.try_own_depths(next, hypotheses, setting),
+                (_, false) => {
+                    self.stop();
+                    hypotheses.bound_scores();
+                    return if hypotheses.len() == 0 { Err(HoldReason::Inconsistent) } else { Ok(()) };
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Fits the old depths from a candidate's pose; the number of steps that took.
-    fn try_old_depths(&mut self, candidate: usize) -> usize {
-        let reference = &self.hypotheses[0].reference;
-        let problem = Problem {
-            goal: &self.goal,
-            frame: &self.frame,
-            reference,
-            sigma: self.sigma,
-            plane: self.options.plane,
-        };
-        let workspace = &mut self.spare.workspace;
-        let pose = self.candidates[candidate].pose;
-        let fitted = workspace.fit(&problem, pose, &reference.inverse_depths, MAX_STEPS);
+    fn try_old_depths(&mut self, candidate: usize, hypotheses: &mut Hypotheses, setting: &Setting) -> usize {
+        let (fitted, steps) = hypotheses.fit_from(self.candidates[candidate].pose, setting, &self.image);
         if let Some(fitted) = fitted
-            && self.search.best.is_none_or(|best| fitted.cost < best.cost)
+            && self.best.is_none_or(|best| fitted.cost < best.cost)
         {
-            self.search.best = Some(fitted);
+            self.best = Some(fitted);
         }
-        workspace.steps
+        steps
     }
 
     /// The pose that explains the image best with the old depths, if one does. Otherwise the candidates have to bring their own.
-    fn end_with_old_depths(&mut self) {
-        self.count = 1;
-        self.search.stage = Stage::Idle;
-        let Some(fitted) = self.search.best else { return };
-        self.hypotheses[0].pose = fitted.pose;
-        if !self.passes(fitted.cost, self.seen()) {
-            (self.search.stage, self.search.next) = (Stage::OwnDepths, 0);
+    fn end_with_old_depths(&mut self, hypotheses: &mut Hypotheses, setting: &Setting) {
+        hypotheses.leave_best(self.best.map(|fitted| fitted.pose));
+        self.stop();
+        let Some(fitted) = self.best else { return };
+        if !setting.passes(fitted.cost, self.image.seen()) {
+            (self.stage, self.next) = (Stage::OwnDepths, 0);
         }
     }
 
     /// Makes a hypothesis of a candidate; the number of steps that took.
-    fn try_own_depths(&mut self, candidate: usize) -> usize {
+    fn try_own_depths(&mut self, candidate: usize, hypotheses: &mut Hypotheses, setting: &Setting) -> usize {
         let Candidate { kind, pose, .. } = self.candidates[candidate];
         match self.propose(&pose, kind == CandidateKind::RotationOnly) {
-            Some(pose) => self.adopt(pose),
+            Some(pose) => hypotheses.adopt(pose, &self.proposed, setting, &self.image),
             None => 0,
         }
     }
 
-    fn end_with_own_depths(&mut self) -> Result<(), HoldReason> {
-        self.search.stage = Stage::Idle;
-        for h in &mut self.hypotheses[..self.count] {
-            h.score = h.score.min(MOST_OF_ONE_IMAGE);
-        }
-        if self.count == 0 { Err(HoldReason::Inconsistent) } else { Ok(()) }
-    }
-
-    /// The inverse depths of a candidate, left in `search.proposed`, and its pose in their unit, where it is not absurd.
+    /// The inverse depths of a candidate, left in `proposed`, and its pose in their unit, where it is not absurd.
     fn propose(&mut self, candidate: &RelativePose, is_rotation: bool) -> Option<RelativePose> {
         if is_rotation {
-            self.search.proposed.fill(1.0);
+            self.proposed.fill(1.0);
             return Some(RelativePose::new(candidate.q_21, Vector3::zeros()));
         }
         let (mut sum, mut behind) = (0.0, 0);
@@ -188,44 +164,11 @@ impl<S: PoseSource> DepthFilter<S> {
             return None;
         }
         let mut matches = self.matches.iter();
-        for (rho, image) in self.search.proposed.iter_mut().zip(&self.frame) {
+        for (rho, image) in self.proposed.iter_mut().zip(&self.image.frame) {
             // A feature that is not seen is as far as the others.
             let depths = image.and_then(|_| matches.next()).map(|m| candidate.depths(m));
             *rho = depths.map_or(1.0, |depths| depths.map_or(0.0, |(z1, _)| 1.0 / (z1 * mean)));
         }
         Some(RelativePose::new(candidate.q_21, candidate.t_21 * mean))
-    }
-
-    /// Adds the hypothesis that is found from this pose and the proposed inverse depths, unless it explains nothing or is
-    /// there already; the number of steps that took.
-    fn adopt(&mut self, pose: RelativePose) -> usize {
-        let Hypothesis { reference, workspace, .. } = &mut self.spare;
-        reference.set_flat(self.options.spread);
-        let problem = Problem {
-            goal: &self.goal,
-            frame: &self.frame,
-            reference,
-            sigma: self.sigma,
-            plane: self.options.plane,
-        };
-        let fitted = workspace.fit(&problem, pose, &self.search.proposed, MAX_STEPS);
-        let steps = workspace.steps;
-        let Some(fitted) = fitted else { return steps };
-        let same = |h: &Hypothesis| {
-            h.pose.rotation_error(&fitted.pose) < 1e-3 && (h.pose.t_21 - fitted.pose.t_21).norm() < 1e-3
-        };
-        let is_known = self.hypotheses[..self.count].iter().any(same);
-        // The depths are not known yet: each may be off by its spread.
-        let depths = self.goal.len() as f64;
-        if is_known || !self.passes(fitted.cost - depths, self.seen()) || self.count == MAX_HYPOTHESES {
-            return steps;
-        }
-        let Hypothesis { reference, workspace, .. } = &mut self.spare;
-        workspace.update(reference, 1.0);
-        let turn = fitted.pose.q_21.angle() / LIKELY_TURN;
-        (self.spare.score, self.spare.pose) = (fitted.cost + turn * turn, fitted.pose);
-        std::mem::swap(&mut self.spare, &mut self.hypotheses[self.count]);
-        self.count += 1;
-        steps
     }
 }
