@@ -10,7 +10,7 @@ use quest_core::Camera;
 use quest_io::{Fault, Pair, Pairs, ReadError};
 
 use crate::{
-    options::{InputFormat, parse_camera},
+    options::{input_format_parser, parse_camera},
     words,
 };
 
@@ -26,8 +26,8 @@ pub(crate) struct InputOptions {
     #[arg(long, value_name = "MODEL,w,h,params", value_parser = parse_camera)]
     camera2: Option<Camera>,
     /// The format of the input [default: by the extension, else by the first characters].
-    #[arg(long, value_enum, hide_default_value = true)]
-    input_format: Option<InputFormat>,
+    #[arg(long, value_parser = input_format_parser())]
+    input_format: Option<quest_io::Format>,
 }
 
 /// The pairs of the input, one after the other, with the cameras of the command line.
@@ -46,7 +46,7 @@ impl InputOptions {
 
     /// Another file with the same cameras and of the same form.
     pub(crate) fn open_file(&self, file: &Path, quiet: bool) -> Result<Input<'_>, ReadError> {
-        let pairs = quest_io::read(file, self.input_format.map(Into::into))?;
+        let pairs = quest_io::read(file, self.input_format)?;
         Ok(Input { options: self, pairs, quiet, told: HashSet::new() })
     }
 

@@ -24,25 +24,12 @@ pub(crate) enum Format {
     Csv,
 }
 
-/// How a file is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum InputFormat {
-    /// One JSON object.
-    Json,
-    /// One JSON object a line.
-    Jsonl,
-    /// `u1,v1,u2,v2[,score]`, one match a row.
-    Csv,
-}
-
-impl From<InputFormat> for quest_io::Format {
-    fn from(format: InputFormat) -> Self {
-        match format {
-            InputFormat::Json => Self::Json,
-            InputFormat::Jsonl => Self::JsonLines,
-            InputFormat::Csv => Self::Csv,
-        }
-    }
+/// The form of a file by its name, with what each is in the help.
+pub(crate) fn input_format_parser() -> impl clap::builder::TypedValueParser<Value = quest_io::Format> {
+    use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+    let forms = quest_io::Format::ALL.map(quest_io::Format::info);
+    PossibleValuesParser::new(forms.map(|form| PossibleValue::new(form.name).help(form.help)))
+        .try_map(|name| quest_io::Format::named(&name).ok_or("no form has this name"))
 }
 
 /// Where a result goes, and how.
@@ -68,7 +55,7 @@ impl OutputOptions {
             Some(quest_io::Format::Json) => Format::Json,
             Some(quest_io::Format::JsonLines) => Format::Jsonl,
             Some(quest_io::Format::Csv) => Format::Csv,
-            None => default,
+            _ => default,
         })
     }
 

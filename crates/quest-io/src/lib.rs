@@ -18,12 +18,9 @@
 #![forbid(unsafe_code)]
 
 mod camera;
-mod csv_file;
 mod error;
 mod estimate_record;
-mod json_file;
 mod json_text;
-mod json_words;
 mod output;
 mod pair;
 mod read;
@@ -37,5 +34,5 @@ pub use estimate_record::{
 pub use json_text::write_json;
 pub use output::{Output, WriteError};
 pub use pair::{Pair, Truth};
-pub use read::{Format, Pairs, STANDARD_INPUT, read};
+pub use read::{Format, FormatInfo, Pairs, STANDARD_INPUT, read};
 pub use record::{CandidateRecord, SolveRecord};

@@ -40,9 +40,9 @@
 //! | [`World`] | the simulated loop, its images and their disturbances | [`closed_loop`], [`scenario`] |
 //!
 //! # The scale
-//! Two images do not tell metres. Normalised by the depths of the *goal's* view, which are the same in every frame, `t` has
-//! the same unknown unit in the whole run, and a proportional law works with it. Normalised by the depths of both views the
-//! unit changes on the way; with the unit norm of an essential matrix there is nothing that goes to zero.
+//! Two images do not tell metres. If `t` is normalised by the depths of the *goal's* view, which are the same in every frame, it has
+//! the same unknown unit in the whole run, and a proportional law works with it. If it is normalised by the depths of both views, the
+//! unit changes on the way. If it has the unit norm of an essential matrix, nothing goes to zero.
 //!
 mod controller;
 mod estimators;
@@ -53,7 +53,7 @@ mod tests;
 mod twist;
 
 pub use estimators::{depth_filter, per_frame, tracker};
-pub use laws::{differential_drive, free_camera};
+pub use laws::*;
 pub use simulation::{closed_loop, plant, scenario};
 
 pub use closed_loop::{Record, World};
@@ -65,11 +65,8 @@ pub use controller::state::{Advice, State, Status, Step};
 pub use depth_filter::DepthFilter;
 pub use depth_filter::fit::Plane;
 pub use depth_filter::options::FilterOptions;
-pub use differential_drive::{DifferentialDriveLaw, PlanarPose};
 pub use estimators::estimate::{Estimate, HoldReason, Motion, PoseEstimator, Support};
 pub use estimators::source::PoseSource;
-pub use free_camera::FreeCameraLaw;
-pub use laws::law::ControlLaw;
 pub use per_frame::{Choice, Length, PerFrame};
 pub use plant::{DifferentialDrive, FreeCamera, Plant};
 pub use simulation::imaging::{Disturbances, Sticky};

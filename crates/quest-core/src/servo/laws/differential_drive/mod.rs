@@ -99,7 +99,7 @@ impl PlanarPose {
 pub struct DifferentialDriveLaw {
     /// The gain of the speed, `k1`, in m/s.
     pub speed_gain: f64,
-    /// The gain of the turn rate, `k2`, in rad/s. Has to exceed `k1 / c`, `c` the unit of t in metres; twice as much is well.
+    /// The gain of the turn rate, `k2`, in rad/s. It must exceed `k1 / c`, where `c` is the unit of t in metres; twice as much is good.
     pub turn_gain: f64,
     /// The robot stops below this distance.
     pub stop_distance: f64,
@@ -109,7 +109,7 @@ pub struct DifferentialDriveLaw {
     pub start_distance: f64,
     /// Turning towards the goal fades out at this distance.
     pub fade_distance: f64,
-    /// Whether the robot is close enough to stop is judged by the mean over about so many images; 1 for none but the last.
+    /// The number of images over whose mean the robot is judged close enough to stop; 1 for the last image alone.
     pub averaged_images: f64,
     /// The robot backs off no further from the goal than this; 0 for never.
     pub furthest_back: f64,

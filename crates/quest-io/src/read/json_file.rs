@@ -9,11 +9,11 @@ use serde::{
     de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
 
+use super::json_words;
 use crate::{
     Pair, Truth,
     camera::{self, camera},
     error::{Fault, Place, ReadError},
-    json_words,
 };
 
 /// How far from 1 the length of a true quaternion may be: four written decimals stay within it.

@@ -1,5 +1,9 @@
 //! From a path to pairs.
 
+mod csv_file;
+mod json_file;
+mod json_words;
+
 use std::{
     fs::File,
     io::{self, BufRead, BufReader, Cursor, Read},
@@ -7,9 +11,8 @@ use std::{
 };
 
 use crate::{
-    Pair, csv_file,
+    Pair,
     error::{Fault, Place, ReadError},
-    json_file,
 };
 
 /// What standard input is called in messages.
@@ -26,16 +29,48 @@ pub enum Format {
     Csv,
 }
 
+/// What is told of a form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FormatInfo {
+    /// The name on the command line.
+    pub name: &'static str,
+    /// The extensions of its files, without the dot.
+    pub extensions: &'static [&'static str],
+    /// One line for the help.
+    pub help: &'static str,
+}
+
 impl Format {
+    /// Every form.
+    pub const ALL: [Self; 3] = [Self::Json, Self::JsonLines, Self::Csv];
+
+    /// What is told of it.
+    #[must_use]
+    pub fn info(self) -> FormatInfo {
+        match self {
+            Self::Json => FormatInfo { name: "json", extensions: &["json"], help: "One JSON object" },
+            Self::JsonLines => {
+                FormatInfo { name: "jsonl", extensions: &["jsonl", "ndjson"], help: "One JSON object a line" }
+            }
+            Self::Csv => FormatInfo {
+                name: "csv",
+                extensions: &["csv"],
+                help: "`u1,v1,u2,v2[,score]`, one match a row",
+            },
+        }
+    }
+
     /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`.
     #[must_use]
     pub fn from_extension(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "json" => Some(Self::Json),
-            "jsonl" | "ndjson" => Some(Self::JsonLines),
-            "csv" => Some(Self::Csv),
-            _ => None,
-        }
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        Self::ALL.into_iter().find(|format| format.info().extensions.contains(&extension.as_str()))
+    }
+
+    /// The form of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.info().name == name)
     }
 }
 
