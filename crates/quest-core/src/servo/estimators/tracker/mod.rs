@@ -5,7 +5,7 @@
 //! 1. **Average** the first images; **search** hypotheses among their matches (`start/`): rotations, planes and scenes with relief.
 //! 2. **Follow**: each hypothesis alive finds the pose of the image on its map (`resection.rs`). The costs add up, with what the
 //!    commanded motion says (`hypothesis.rs`); hopeless hypotheses are dropped, and one that sees the camera go another way than it was
-//!    sent. Until the camera has been seen to go where it is sent the pose is [`Unconfirmed`](Support::Unconfirmed).
+//!    sent. Until the camera has been seen to go where it is sent the pose is [`Unconfirmed`](crate::servo::Support::Unconfirmed).
 //! 3. **Gate**: enough features agree, and the camera can have come there since the last image.
 //! 4. **Learn**: an image from somewhere new becomes a key image, and the map is adjusted by one damped step an image until it
 //!    settles (`adjust/`).
