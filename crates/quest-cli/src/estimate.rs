@@ -6,17 +6,17 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use quest_core::correspondence::Usable;
-use quest_core::lanes::SearchScore;
-use quest_core::robust::{self, Estimate, EstimateError, Options, Priors, ThirdView};
-use quest_core::solver::SolverName;
-use quest_core::{Correspondence, InputError};
+use quest_core::robust::{self, Estimate, EstimateError, KnownDirection, Options, Priors, ThirdView};
+use quest_core::{Correspondence, InputError, RelativePose};
 use quest_io::{EstimateRecord, Pair, ReadError, ThirdViewRecord};
 
 use crate::{
-    Failure, Outcome, estimate_table,
+    Failure, Outcome,
+    estimate_options::{EstimateOptions, OfEstimate, parse_direction, parse_pose},
+    estimate_table,
     in_order::in_order,
     input::InputOptions,
-    options::{OutputOptions, loss_parser, solver_parser},
+    options::OutputOptions,
     progress::Progress,
     rows, words,
     writer::{Record, Writer},
@@ -34,27 +34,27 @@ Examples:
   quest-cli estimate pairs.jsonl -o results.jsonl --resume     after it was ended
   quest-cli estimate views12.json --third views13.json
 
-Files are those of `quest-cli solve`. With scores the best matches are tried first. The pairs of JSON
-Lines are worked on by all cores, the results in the order of the lines.
+Files are those of `quest-cli solve`. With scores the best matches are tried first. All cores work on the
+pairs of JSON Lines; the results are in the order of the lines.
 With --third the poses of views 1 and 2 and of views 1 and 3 are chosen so that the depths of their
 common points agree; a point is common where its numbers in view 1 are the same.
 
 Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
   The model is general, planar or pure_rotation (no translation that stands clear of the noise);
-  the evidence is the median residual of the inliers under each. Of a plane, and where the camera
-  hardly moved, there may be a second pose that the noise does not rule out, the runner-up.
-  Matches that determine no pose, such as points on a line, are bad input;
-  among JSON Lines their model is degenerate, with a reason and without a pose. No line stops the others:
-  one that cannot be read gets a record with its reason. With -o each record is kept in FILE.part as it
-  comes, which becomes FILE at the end; --resume goes on after the records that are there.
+  the evidence is the median residual of the inliers under each. A plane may have a second pose that the
+  noise does not rule out, the runner-up, and so may a camera that hardly moved.
+  Matches that determine no pose, such as points on a line, are bad input. Among JSON Lines their model is
+  degenerate, with a reason and without a pose. No line stops the others: one that cannot be read gets a
+  record with its reason. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
+  at the end; --resume goes on after the records that are there.
   A pixel without a viewing ray is an outlier; invalid_count tells how many there are.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
   The same seed gives the same answer; each line of JSON Lines has random numbers of its own.
 
 Exit status:
-  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the lines),
-  2 bad input or arguments (of JSON Lines: none of the lines could be read).";
+  0 an answer, 1 no pose could be found (JSON Lines: for one or more of the lines),
+  2 bad input or arguments (JSON Lines: none of the lines could be read).";
 
 /// One pose from matches with outliers.
 #[derive(Args, Debug)]
@@ -62,39 +62,25 @@ Exit status:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: InputOptions,
-    /// Matches with a Sampson error below this are inliers: two to three standard deviations of the noise, in pixels, 1 by
-    /// default; without cameras in units of the plane z = 1, where it has to be given.
-    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
-    threshold: Option<f64>,
-    /// How sure to be that a sample without outliers was seen.
-    #[arg(long, value_name = "P", allow_negative_numbers = true, default_value_t = Options::default().confidence)]
-    confidence: f64,
-    /// Draw at most so many samples.
-    #[arg(long, value_name = "N", default_value_t = Options::default().max_iterations)]
-    max_iterations: usize,
-    /// Answer if at most so many poses as good as the best are to be expected where all matches are false; `inf` to answer
-    /// always.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = Options::default().max_false_alarms)]
-    max_false_alarms: f64,
-    /// The seed of the samples.
-    #[arg(long, value_name = "S", default_value_t = 0)]
-    seed: u64,
-    /// The solver of the samples; `quest-cli solvers` describes them.
-    #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
-    solver: SolverName,
-    /// What a match counts, by how far it is off: averaged over all thresholds up to one, or with one threshold (MSAC).
-    #[arg(long, value_name = "LOSS", default_value = SearchScore::default().name(), value_parser = loss_parser())]
-    loss: SearchScore,
-    /// The matches of view 1 with a third view: of two possible poses the one that agrees with them is taken.
+    #[command(flatten)]
+    search: EstimateOptions<OfEstimate>,
+    /// A pose to begin with: a quaternion, scalar first, and a translation, whose length plays no part.
+    #[arg(long, value_name = "W,X,Y,Z,TX,TY,TZ", allow_hyphen_values = true, value_parser = parse_pose)]
+    initial_pose: Option<RelativePose>,
+    /// A direction that both cameras know, such as gravity, or the axis about which a robot turns, which is the same in both. Poses
+    /// that turn one further than DEG degrees from the other are not considered.
+    #[arg(long, value_name = "X1,Y1,Z1[,X2,Y2,Z2],DEG", allow_hyphen_values = true, value_parser = parse_direction)]
+    known_direction: Option<KnownDirection>,
+    /// The matches of view 1 with a third view. Where two poses are possible, the one that agrees with them is taken.
     #[arg(long, value_name = "FILE")]
     third: Option<PathBuf>,
     /// What to do with a match that has no bearing, such as a pixel without a viewing ray.
     #[arg(long, value_enum, default_value = "outlier")]
     invalid: Invalid,
-    /// The number of threads, 0 for all of the machine's: pairs are divided among them.
+    /// The number of threads, 0 for all of the machine's; pairs are divided among them.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// The number of the first pair: a part of a larger input has the answers that it has there.
+    /// The number of the first pair. A part of a larger input that begins with this pair has the same answers as there.
     #[arg(long, value_name = "K", default_value_t = 0)]
     first_index: u64,
     /// Keep the records that an earlier run wrote to -o, and go on with the pair after them.
@@ -127,9 +113,7 @@ struct Estimated {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut pairs = arguments.input.open(arguments.output.quiet)?;
     let is_lines = pairs.is_lines();
-    if arguments.third.is_some() && is_lines {
-        return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
-    }
+    arguments.check(is_lines)?;
     let (mut writer, there) = Writer::open_long(&arguments.output, is_lines, arguments.resume)?;
     let progress = Progress::new("pairs", None, arguments.output.quiet);
     let mut tally = Tally { are_there: there > 0, ..Tally::default() };
@@ -211,26 +195,28 @@ impl Estimated {
 
 impl Arguments {
     fn options(&self, pair: &Pair, index: u64) -> Result<Options, Failure> {
-        let options = Options {
-            confidence: self.confidence,
-            max_iterations: self.max_iterations,
-            max_false_alarms: self.max_false_alarms,
-            seed: self.seed,
-            index,
-            solver: self.solver,
-            loss: self.loss,
-            ..Options::default()
-        };
-        match (&pair.cameras, self.threshold) {
+        match (&pair.cameras, self.search.threshold) {
             (Some([camera1, camera2]), threshold) => {
-                let threshold = threshold.unwrap_or(THRESHOLD);
-                Ok(Options { threshold, ..options.with_cameras(camera1, camera2) })
+                let options = self.search.options(threshold.unwrap_or(THRESHOLD), index);
+                Ok(options.with_cameras(camera1, camera2))
             }
-            (None, Some(threshold)) => Ok(Options { threshold, ..options }),
+            (None, Some(threshold)) => Ok(self.search.options(threshold, index)),
             (None, None) => Err(Failure::Arguments(format!(
                 "{}: found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1",
                 pair.place
             ))),
+        }
+    }
+
+    /// What cannot be asked of such an input.
+    fn check(&self, is_lines: bool) -> Result<(), Failure> {
+        let refuse = |what: &str| Err(Failure::Arguments(what.to_owned()));
+        match (is_lines, &self.third, &self.initial_pose, &self.known_direction) {
+            (true, Some(_), ..) => refuse("found JSON Lines and --third, expected one pair"),
+            (true, _, Some(_), _) => refuse("found JSON Lines and --initial-pose, expected one pair"),
+            (_, Some(_), Some(_), _) => refuse("found --third and --initial-pose, expected one of them"),
+            (_, Some(_), _, Some(_)) => refuse("found --third and --known-direction, expected one of them"),
+            _ => Ok(()),
         }
     }
 }
@@ -243,7 +229,7 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> R
     let result = match (usable.error(), arguments.invalid) {
         (Some(error), Invalid::Raise) => return Err(pair.refuse(error).into()),
         (Some(error), Invalid::Pair) => Err(error.into()),
-        _ => search(pair, &usable, &options, third.as_ref()),
+        _ => search(arguments, pair, &usable, &options, third.as_ref()),
     };
     let elapsed_ms = start.elapsed().as_secs_f64() * 1e3;
     let (record, reason) = match result {
@@ -266,6 +252,7 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> R
 
 /// The estimate of the usable matches of a pair, its inliers among all of them.
 fn search(
+    arguments: &Arguments,
     pair: &Pair,
     usable: &Usable,
     options: &Options,
@@ -273,7 +260,8 @@ fn search(
 ) -> Result<(Estimate, Option<ThirdView>), EstimateError> {
     let Some((others, others_options)) = third else {
         let scores = pair.scores.as_ref().map(|scores| usable.keep(scores));
-        let priors = Priors { scores: scores.as_deref(), ..Priors::default() };
+        let (pose, direction) = (arguments.initial_pose, arguments.known_direction);
+        let priors = Priors { scores: scores.as_deref(), pose, direction };
         let mut estimate = robust::estimate_with(&usable.matches, options, &priors)?;
         estimate.inliers = usable.spread(&estimate.inliers);
         return Ok((estimate, None));

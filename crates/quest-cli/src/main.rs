@@ -7,6 +7,7 @@ mod candidate_table;
 mod colmap;
 mod drawing;
 mod estimate;
+mod estimate_options;
 mod estimate_table;
 mod figures;
 mod in_order;

@@ -10,6 +10,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
+use quest_core::robust::{EstimateError, Options};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -53,16 +54,13 @@ pub enum Uncalibrated {
 pub struct VerifyOptions {
     /// The pairs, two names of images each; all pairs with matches for `None`.
     pub pairs: Option<Vec<(String, String)>>,
-    /// Matches with a Sampson error below this are inliers, in pixels. COLMAP's 4 gives as many points as COLMAP.
-    pub threshold: f64,
+    /// How each pair is searched; its cameras set the focal lengths, and its key the index. COLMAP's threshold of 4 pixels gives as
+    /// many points as COLMAP, and its 10,000 iterations find a pair of which a fifth of the matches are right.
+    pub search: Options,
     /// Pairs with fewer inliers have no pose.
     pub min_inliers: usize,
     /// Pairs with a smaller part of inliers among their matches have no pose.
     pub min_inlier_ratio: f64,
-    /// How sure the search is to be that it has seen a good sample.
-    pub confidence: f64,
-    /// At most so many samples are drawn; COLMAP's 10,000 finds a pair of which a fifth of the matches are right.
-    pub max_iterations: usize,
     /// What to do with pairs that have a row.
     pub existing: Existing,
     /// What to do where a focal length is a guess.
@@ -72,8 +70,6 @@ pub struct VerifyOptions {
     pub watermark: f64,
     /// The number of threads, all of the machine's for zero. It changes no answer.
     pub threads: usize,
-    /// The same seed gives the same rows.
-    pub seed: u64,
     /// Whether to write nothing.
     pub dry_run: bool,
 }
@@ -84,16 +80,18 @@ impl Default for VerifyOptions {
     fn default() -> Self {
         Self {
             pairs: None,
-            threshold: 4.0,
+            search: Options {
+                threshold: 4.0,
+                confidence: 0.999,
+                max_iterations: 10_000,
+                ..Options::default()
+            },
             min_inliers: 15,
             min_inlier_ratio: 0.0,
-            confidence: 0.999,
-            max_iterations: 10_000,
             existing: Existing::default(),
             uncalibrated: Uncalibrated::default(),
             watermark: 0.7,
             threads: 0,
-            seed: 0,
             dry_run: false,
         }
     }
@@ -104,20 +102,14 @@ impl VerifyOptions {
         let refuse = |option, found: f64, expected| {
             Err(ColmapError::Option { option, found: found.to_string(), expected })
         };
-        if !(self.threshold > 0.0 && self.threshold.is_finite()) {
-            return refuse("threshold", self.threshold, "a positive finite number of pixels");
-        }
-        if !(self.confidence > 0.0 && self.confidence < 1.0) {
-            return refuse("confidence", self.confidence, "a number above 0 and below 1");
+        if let Err(EstimateError::Option { option, found, expected }) = self.search.check() {
+            return refuse(option, found, expected);
         }
         if !(0.0..=1.0).contains(&self.min_inlier_ratio) {
             return refuse("smallest ratio of inliers", self.min_inlier_ratio, "a number from 0 to 1");
         }
         if self.watermark.is_nan() || self.watermark <= 0.0 {
             return refuse("ratio of a watermark", self.watermark, "a positive number, above 1 for never");
-        }
-        if self.max_iterations == 0 {
-            return refuse("largest number of iterations", 0.0, "at least 1");
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator, PyList};
 
-use crate::estimate_result::{_estimate, Estimate, RunnerUp, State};
+use crate::estimate_result::{Estimate, RunnerUp, State};
 use crate::html;
 
 /// The estimates of many pairs, in columns; the row of a pair without a pose is zero.
@@ -30,7 +30,7 @@ type Batch = (Vec<Option<State>>, Vec<Option<String>>, Vec<usize>, Vec<usize>);
 #[pyfunction]
 pub(crate) fn _estimate_batch(state: Batch) -> EstimateBatch {
     let (estimates, reason, offsets, invalid_count) = state;
-    let estimates = estimates.into_iter().map(|state| state.map(_estimate)).collect();
+    let estimates = estimates.into_iter().map(|state| state.map(Estimate::from_state)).collect();
     EstimateBatch { estimates, reason, offsets, invalid_count }
 }
 
@@ -87,8 +87,9 @@ impl EstimateBatch {
         self.rows(py, f64::NAN, |e| e.other().map(&one))
     }
 
-    fn items(&self) -> impl Iterator<Item = Option<Estimate>> {
-        self.estimates.iter().cloned()
+    fn items(&self, py: Python<'_>) -> PyResult<Vec<Option<Py<Estimate>>>> {
+        let one = |estimate: &Option<Estimate>| estimate.clone().map(|e| e.into_python(py)).transpose();
+        self.estimates.iter().map(one).collect()
     }
 }
 
@@ -98,17 +99,18 @@ impl EstimateBatch {
         self.estimates.len()
     }
 
-    fn __getitem__(&self, index: isize) -> PyResult<Option<Estimate>> {
+    fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<Option<Py<Estimate>>> {
         let count = self.estimates.len();
         let place = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
         let place = place.and_then(|place| usize::try_from(place).ok());
-        place.and_then(|place| self.estimates.get(place)).cloned().ok_or_else(|| {
+        let found = place.and_then(|place| self.estimates.get(place)).ok_or_else(|| {
             PyIndexError::new_err(format!("pair {index} is not one of the {count} of the batch"))
-        })
+        })?;
+        found.clone().map(|estimate| estimate.into_python(py)).transpose()
     }
 
     fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
-        PyList::new(py, self.items().collect::<Vec<_>>())?.try_iter()
+        PyList::new(py, self.items(py)?)?.try_iter()
     }
 
     /// list of str or None : The model of each pair, as in ``Estimate``; None where no pose was found.
@@ -201,6 +203,24 @@ impl EstimateBatch {
     #[getter]
     fn noise_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |e| e.noise_px)
+    }
+
+    /// numpy.ndarray of shape (B, 3) : The normals of the planes, as in ``Estimate``; NaN where the model is not ``"planar"``.
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        self.rows::<3>(py, f64::NAN, Estimate::plane)
+    }
+
+    /// numpy.ndarray of shape (B,) : The shares of false matches that the threshold accepts.
+    #[getter]
+    fn false_share<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.column(py, |e| e.false_share)
+    }
+
+    /// numpy.ndarray of shape (B,) of int : How many matches were set aside because they did not move at all.
+    #[getter]
+    fn unmoved<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<usize>> {
+        self.column(py, |e| e.unmoved)
     }
 
     /// numpy.ndarray of shape (B, 3) : The median residuals under a rotation, a plane and the general model; NaN without a pose.

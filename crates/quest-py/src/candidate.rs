@@ -1,19 +1,17 @@
 //! `Candidate`: one pose that may be the true one.
 
-use numpy::{PyArray1, PyArray2, ToPyArray};
+use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use quest_core::Correspondence;
 use quest_core::feasibility::Feasibility;
-use quest_core::{Correspondence, RelativePose};
 
-use crate::pose::{Pose, PoseState};
+use crate::pose::{Pose, PoseState, RelativePose, with_base};
 
 /// A pose that may be the true one, as ``solve`` returns it: ``X2 = R @ X1 + t``.
 ///
-/// ``X1`` and ``X2`` are the coordinates of a point in the frames of camera 1 and camera 2: x to the right,
-/// y down, z forward. ``t`` and the depths share one scale: the mean absolute depth over both views is 1, so that
-/// the length of ``t`` is the parallax. A candidate never changes: its arrays are fresh copies at each access.
-#[pyclass(frozen, eq, module = "quest_pose")]
+/// ``t`` and the depths share one scale: the mean absolute depth over both views is 1.
+#[pyclass(frozen, eq, extends = RelativePose, module = "quest_pose")]
 #[derive(Debug, PartialEq)]
 pub(crate) struct Candidate {
     /// str : Where it comes from.
@@ -60,10 +58,14 @@ impl Candidate {
             feasible,
         }
     }
+
+    pub(crate) fn into_python(self, py: Python<'_>) -> PyResult<Py<Self>> {
+        with_base(py, self.pose, self)
+    }
 }
 
 /// The depths of a match, infinite where undetermined: NaN would make two equal candidates differ.
-fn depths(pose: &RelativePose, m: &Correspondence) -> (f64, f64) {
+fn depths(pose: &quest_core::RelativePose, m: &Correspondence) -> (f64, f64) {
     let finite = |z: f64| if z.is_finite() { z } else { f64::INFINITY };
     pose.depths(m).map_or((f64::INFINITY, f64::INFINITY), |(z1, z2)| (finite(z1), finite(z2)))
 }
@@ -72,38 +74,14 @@ type State = (String, PoseState, Vec<f64>, Vec<f64>, f64, usize, bool);
 
 /// The candidate that ``Candidate.__reduce__`` took apart.
 #[pyfunction]
-pub(crate) fn _candidate(state: State) -> Candidate {
+pub(crate) fn _candidate(py: Python<'_>, state: State) -> PyResult<Py<Candidate>> {
     let (kind, pose, depths1, depths2, residual, in_front, feasible) = state;
-    Candidate { kind, pose: Pose::from_state(pose), depths1, depths2, residual, in_front, feasible }
+    let pose = Pose::from_state(pose);
+    Candidate { kind, pose, depths1, depths2, residual, in_front, feasible }.into_python(py)
 }
 
 #[pymethods]
 impl Candidate {
-    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
-    #[getter]
-    #[pyo3(name = "R")]
-    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.pose.r(py)
-    }
-
-    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
-    #[getter]
-    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_wxyz(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
-    #[getter]
-    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_xyzw(py)
-    }
-
     /// numpy.ndarray of shape (N,) : The depth of each match in view 1, in the unit of ``t``.
     ///
     /// A depth multiplies the point as it was given: it is a z coordinate for normalised points and for pixels of

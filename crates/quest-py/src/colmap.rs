@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use quest_colmap::{
     ColmapError, Database, Existing, Given, PairId, Uncalibrated, VerifyOptions, Watch, export_matches,
     export_poses, verify, write_g2o, write_two_view_geometries,
@@ -14,6 +15,7 @@ use quest_core::robust::Model;
 
 use crate::errors::QuestError;
 use crate::estimate_result::Estimate;
+use crate::options;
 use crate::supervisor::Supervisor;
 
 impl Watch for Supervisor<'_> {
@@ -38,8 +40,7 @@ type Names = Vec<(String, String)>;
 /// The report of ``quest_pose.colmap.verify`` as JSON.
 #[pyfunction]
 #[pyo3(signature = (
-    database, pairs, threshold, min_inliers, min_inlier_ratio, confidence, max_iterations, existing, uncalibrated, watermark,
-    num_threads, seed, dry_run, progress
+    database, pairs, min_inliers, min_inlier_ratio, existing, uncalibrated, watermark, num_threads, dry_run, progress, options
 ))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of its wrapper")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands values over")]
@@ -47,18 +48,15 @@ pub(crate) fn _colmap_verify(
     py: Python<'_>,
     database: PathBuf,
     pairs: Option<Names>,
-    threshold: f64,
     min_inliers: usize,
     min_inlier_ratio: f64,
-    confidence: f64,
-    max_iterations: usize,
     existing: &str,
     uncalibrated: &str,
     watermark: f64,
     num_threads: usize,
-    seed: u64,
     dry_run: bool,
     progress: Option<Py<PyAny>>,
+    options: &Bound<'_, PyDict>,
 ) -> PyResult<String> {
     let unknown = |name: &str, found: &str, expected: &str| {
         QuestError::new_err(format!("{name} is {found:?}, expected {expected}"))
@@ -76,16 +74,13 @@ pub(crate) fn _colmap_verify(
     };
     let options = VerifyOptions {
         pairs,
-        threshold,
+        search: options::options("verify", Some(options), &["index"], true)?,
         min_inliers,
         min_inlier_ratio,
-        confidence,
-        max_iterations,
         existing,
         uncalibrated,
         watermark,
         threads: num_threads,
-        seed,
         dry_run,
     };
     let supervisor = Supervisor::new(progress.as_ref(), 0);
@@ -141,7 +136,7 @@ pub(crate) fn _colmap_write(
 
 /// Writes matches or poses into a file: how many pairs were written, and why the others were not.
 #[pyfunction]
-#[pyo3(signature = (database, target, what, pairs, threshold, min_inliers, seed, progress))]
+#[pyo3(signature = (database, target, what, pairs, min_inliers, progress, options))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of its wrapper")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands values over")]
 pub(crate) fn _colmap_export(
@@ -150,13 +145,13 @@ pub(crate) fn _colmap_export(
     target: PathBuf,
     what: &str,
     pairs: Option<Names>,
-    threshold: f64,
     min_inliers: usize,
-    seed: u64,
     progress: Option<Py<PyAny>>,
+    options: &Bound<'_, PyDict>,
 ) -> PyResult<(usize, Vec<(String, String)>)> {
     let are_poses = what == "poses";
-    let options = VerifyOptions { threshold, min_inliers, seed, ..VerifyOptions::default() };
+    let search = options::options("export_poses", Some(options), &["index"], true)?;
+    let options = VerifyOptions { search, min_inliers, ..VerifyOptions::default() };
     let supervisor = Supervisor::new(progress.as_ref(), 0);
     let exported = py.detach(|| {
         supervisor.run(|| {

@@ -4,15 +4,15 @@ use std::str::FromStr;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use pyo3::prelude::*;
-use quest_core::lanes::{SearchScore, UnknownLoss};
-use quest_core::robust::{self, KnownDirection, Options, Priors};
+use pyo3::types::PyDict;
+use quest_core::robust::{self, KnownDirection, Priors};
 use quest_core::{InputError, RelativePose};
 
-use crate::arrays;
 use crate::errors::{self, NoAnswer, QuestError, ShapeMismatch};
 use crate::estimate_result::Estimate;
-use crate::solve::{Views, solver_named};
+use crate::solve::Views;
 use crate::supervisor::Supervisor;
+use crate::{arrays, options};
 
 /// One pose from matches with outliers.
 ///
@@ -23,25 +23,6 @@ use crate::supervisor::Supervisor;
 ///     z = 1 of each camera. Three numbers a row are bearings of any length, and take no camera.
 /// camera1, camera2 : Camera or array_like of shape (3, 3), optional
 ///     The cameras, or their matrices K. ``camera2`` is ``camera1`` where absent.
-/// threshold : float, optional
-///     Matches with a Sampson error below this are inliers: two to three standard deviations of the points' noise, in
-///     pixels, 1 by default. Without cameras in units of the plane z = 1, in radians for bearings; it has to be given then.
-/// confidence : float
-///     How sure to be that a sample without outliers was seen before the search stops.
-/// min_iterations, max_iterations : int
-///     At least and at most so many samples are drawn.
-/// max_false_alarms : float
-///     The best pose is returned if at most so many poses as good as it are to be expected where all matches are false:
-///     lower to be surer that it is none of those, infinite to have it whatever chance explains.
-/// seed : int
-///     The same seed gives the same answer, bit for bit.
-/// index : int
-///     Which of the pairs that share a seed this is: each has random numbers of its own.
-/// solver : str, optional
-///     The solver of the samples, one of the names in ``solvers()``; the first of them where absent.
-/// loss : {"marginalised", "truncated"}
-///     What a match counts in the search, by how far it is off: averaged over all thresholds up to one, or with one
-///     threshold (MSAC).
 /// scores : array_like of shape (N,), optional
 ///     One a match, higher is better: the best matches are tried first.
 /// initial_pose : (array_like of shape (3, 3), array_like of shape (3,)), optional
@@ -52,6 +33,10 @@ use crate::supervisor::Supervisor;
 /// invalid : {"outlier", "pair", "raise"}
 ///     What a match without a bearing is: a NaN, or a pixel for which a camera has no viewing ray. An outlier, which the
 ///     result counts; or no match of a pair that has a pose (``NoAnswer``); or the error that it is for ``solve``.
+/// threshold, confidence, max_iterations, seed, ... : optional
+///     How the search is made: the keywords of ``EstimateOptions``, which names them all with their defaults. The threshold is the
+///     one to think of: two to three standard deviations of the points' noise, in pixels, 1 by default. Without cameras it is in
+///     units of the plane z = 1, in radians for bearings, and must be given.
 ///
 /// Returns
 /// -------
@@ -71,16 +56,16 @@ use crate::supervisor::Supervisor;
 /// NotFinite
 ///     For a NaN with ``invalid="raise"``, and for masked values.
 /// QuestError
-///     The base of these, itself for an impossible option.
+///     The base of these, itself for an option of an impossible value.
+/// TypeError
+///     For an option of another type, and for a keyword that is none.
 ///
 /// Notes
 /// -----
 /// The lock of the interpreter is released while the search runs; Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (
-    x1, x2, camera1=None, camera2=None, *, threshold=None, confidence=0.9999, min_iterations=300, max_iterations=100_000,
-    max_false_alarms=0.03, seed=0, index=0, solver=None, loss="marginalised", scores=None, initial_pose=None,
-    known_direction=None, invalid="outlier"
+    x1, x2, camera1=None, camera2=None, *, scores=None, initial_pose=None, known_direction=None, invalid="outlier", **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands tuples over")]
@@ -90,44 +75,24 @@ pub(crate) fn estimate(
     x2: &Bound<'_, PyAny>,
     camera1: Option<&Bound<'_, PyAny>>,
     camera2: Option<&Bound<'_, PyAny>>,
-    threshold: Option<f64>,
-    confidence: f64,
-    min_iterations: usize,
-    max_iterations: usize,
-    max_false_alarms: f64,
-    seed: u64,
-    index: u64,
-    solver: Option<&str>,
-    loss: &str,
     scores: Option<&Bound<'_, PyAny>>,
     initial_pose: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
-    known_direction: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>, f64)>,
+    known_direction: Option<Direction<'_>>,
     invalid: &str,
-) -> PyResult<Estimate> {
-    let (solver, loss) = (solver_named(solver)?, loss_named(loss)?);
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<Estimate>> {
     let invalid: Invalid = invalid.parse()?;
     let views = Views::new(x1, x2, camera1, camera2)?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     let pose = initial_pose.as_ref().map(|given| pose("initial_pose", given)).transpose()?;
     let direction = known_direction.as_ref().map(direction).transpose()?;
-    let options = Options {
-        threshold: threshold_for(views.cameras().is_some(), threshold)?,
-        confidence,
-        min_iterations,
-        max_iterations,
-        max_false_alarms,
-        seed,
-        index,
-        solver,
-        loss,
-        ..Options::default()
-    };
+    let options = options::options("estimate", options, &[], views.cameras().is_some())?;
     let options = match views.cameras() {
         Some([camera1, camera2]) => options.with_cameras(camera1, camera2),
         None => options,
     };
     let supervisor = Supervisor::new(None, 1);
-    py.detach(|| {
+    let found = py.detach(|| {
         let usable = views.usable().map_err(|error| errors::input(&error))?;
         if let Some(error) = usable.error().filter(|_| invalid != Invalid::Outlier) {
             return Err(invalid.error(&error));
@@ -144,7 +109,8 @@ pub(crate) fn estimate(
         let found = supervisor.run_here(search)?;
         let found = found.map_err(|error| errors::estimate_of_usable(&error, &usable))?;
         Ok(Estimate::of_usable(&found, &usable))
-    })
+    })?;
+    found.into_python(py)
 }
 
 /// What a match without a bearing is.
@@ -183,21 +149,6 @@ impl Invalid {
     }
 }
 
-/// The loss of this name.
-pub(crate) fn loss_named(name: &str) -> PyResult<SearchScore> {
-    name.parse().map_err(|error: UnknownLoss| QuestError::new_err(error.to_string()))
-}
-
-/// The threshold: one pixel where there are cameras.
-pub(crate) fn threshold_for(has_cameras: bool, threshold: Option<f64>) -> PyResult<f64> {
-    threshold.or_else(|| has_cameras.then_some(1.0)).ok_or_else(|| {
-        QuestError::new_err(
-            "neither cameras nor a threshold are given, expected cameras, or a threshold in units of the plane z = 1 \
-             (radians for bearings)",
-        )
-    })
-}
-
 /// A rotation matrix and a translation of the argument `name`.
 pub(crate) fn pose(name: &str, (r, t): &(Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<RelativePose> {
     let t = vector3(&format!("{name}[1]"), t)?;
@@ -221,9 +172,10 @@ pub(crate) fn rotation(name: &str, r: &Bound<'_, PyAny>) -> PyResult<UnitQuatern
     Ok(UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix)))
 }
 
-fn direction(
-    (first, second, tolerance): &(Bound<'_, PyAny>, Bound<'_, PyAny>, f64),
-) -> PyResult<KnownDirection> {
+/// The direction in the frames of both cameras, and the tolerance.
+pub(crate) type Direction<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, f64);
+
+pub(crate) fn direction((first, second, tolerance): &Direction<'_>) -> PyResult<KnownDirection> {
     Ok(KnownDirection {
         in_view1: vector3("known_direction[0]", first)?,
         in_view2: vector3("known_direction[1]", second)?,

@@ -1,17 +1,18 @@
 //! `estimate_batch`: many pairs at once, results in columns.
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use quest_core::Camera;
 use quest_core::correspondence::Usable;
-use quest_core::robust::{Batch, EstimateError, Options, Problem};
+use quest_core::robust::{Batch, EstimateError, KnownDirection, Options, Problem};
 
 use crate::arrays::{self, Points};
 use crate::batch_result::EstimateBatch;
 use crate::camera;
 use crate::errors::{self, BadCamera, ShapeMismatch};
-use crate::estimate::{Invalid, loss_named, threshold_for};
+use crate::estimate::{Direction, Invalid, direction};
 use crate::estimate_result::Estimate;
-use crate::solve::solver_named;
+use crate::options;
 use crate::supervisor::Supervisor;
 
 /// Fewer pairs are solved where they are called: a thread costs as much as some of them.
@@ -27,8 +28,6 @@ const FEW: usize = 4;
 ///     Pair ``i`` has the rows from ``offsets[i]`` to ``offsets[i + 1]``, the latter not included.
 /// cameras1, cameras2 : Camera, array_like of shape (3, 3), or a sequence of B of them, optional
 ///     The cameras of all pairs, or of each. ``cameras2`` is ``cameras1`` where absent.
-/// threshold, confidence, min_iterations, max_iterations, max_false_alarms, seed, solver, loss
-///     As for ``estimate``.
 /// first_index : int
 ///     Pair ``i`` gets the answer that ``estimate`` gives for it with the same seed and ``index=first_index + i``, whatever
 ///     the number of threads. A batch that is a part of a larger one begins with the index of its first pair there.
@@ -44,6 +43,10 @@ const FEW: usize = 4;
 /// progress : callable, optional
 ///     Called with the number of pairs that are done and that of all, some twenty times a second and at the end. An exception
 ///     ends the batch.
+/// known_direction : (array_like of shape (3,), array_like of shape (3,), float), optional
+///     As for ``estimate``, the same for all pairs.
+/// threshold, confidence, max_iterations, seed, ... : optional
+///     As for ``estimate``: the keywords of ``EstimateOptions`` but for ``index``, whose place ``first_index`` and ``indices`` take.
 ///
 /// Returns
 /// -------
@@ -60,9 +63,8 @@ const FEW: usize = 4;
 /// The lock of the interpreter is released while the searches run; Ctrl-C ends them.
 #[pyfunction]
 #[pyo3(signature = (
-    x1, x2, offsets, cameras1=None, cameras2=None, *, threshold=None, confidence=0.9999, min_iterations=300,
-    max_iterations=100_000, max_false_alarms=0.03, seed=0, first_index=0, solver=None, loss="marginalised",
-    num_threads=0, scores=None, indices=None, invalid="outlier", progress=None
+    x1, x2, offsets, cameras1=None, cameras2=None, *, first_index=0, num_threads=0, scores=None, indices=None,
+    invalid="outlier", progress=None, known_direction=None, **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[expect(clippy::needless_pass_by_value, reason = "pyo3 hands callables over")]
@@ -73,22 +75,15 @@ pub(crate) fn estimate_batch(
     offsets: &Bound<'_, PyAny>,
     cameras1: Option<&Bound<'_, PyAny>>,
     cameras2: Option<&Bound<'_, PyAny>>,
-    threshold: Option<f64>,
-    confidence: f64,
-    min_iterations: usize,
-    max_iterations: usize,
-    max_false_alarms: f64,
-    seed: u64,
     first_index: u64,
-    solver: Option<&str>,
-    loss: &str,
     num_threads: usize,
     scores: Option<&Bound<'_, PyAny>>,
     indices: Option<&Bound<'_, PyAny>>,
     invalid: &str,
     progress: Option<Py<PyAny>>,
+    known_direction: Option<Direction<'_>>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<EstimateBatch> {
-    let (solver, loss) = (solver_named(solver)?, loss_named(loss)?);
     let (x1, x2) = (arrays::points("x1", x1)?, arrays::points("x2", x2)?);
     let offsets = offsets_of(offsets, &x1)?;
     let pairs = offsets.len() - 1;
@@ -100,10 +95,9 @@ pub(crate) fn estimate_batch(
         }
         (first, second) => first.map(|first| (first.clone(), second.unwrap_or(first))),
     };
-    let threshold = threshold_for(cameras.is_some(), threshold)?;
-    let index = if indices.is_some() { 0 } else { first_index };
-    let numbers = Options { confidence, min_iterations, max_iterations, seed, index, ..Options::default() };
-    let options = Options { threshold, max_false_alarms, solver, loss, ..numbers };
+    let options = options::options("estimate_batch", options, &["index"], cameras.is_some())?;
+    let options = Options { index: if indices.is_some() { 0 } else { first_index }, ..options };
+    let direction = known_direction.as_ref().map(direction).transpose()?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     if let Some(scores) = scores.as_ref().filter(|scores| scores.len() != x1.len()) {
         return Err(length("scores", scores.len(), x1.len(), "match"));
@@ -112,8 +106,18 @@ pub(crate) fn estimate_batch(
     if let Some(indices) = indices.as_ref().filter(|indices| indices.len() != pairs) {
         return Err(length("indices", indices.len(), pairs, "pair"));
     }
-    let task =
-        Task { x1, x2, offsets, cameras, scores, indices, invalid: invalid.parse()?, options, num_threads };
+    let task = Task {
+        x1,
+        x2,
+        offsets,
+        cameras,
+        scores,
+        indices,
+        direction,
+        invalid: invalid.parse()?,
+        options,
+        num_threads,
+    };
     py.detach(|| task.run(progress.as_ref()))
 }
 
@@ -129,6 +133,7 @@ struct Task {
     cameras: Option<(Vec<Camera>, Vec<Camera>)>,
     scores: Option<Vec<f64>>,
     indices: Option<Vec<u64>>,
+    direction: Option<KnownDirection>,
     invalid: Invalid,
     options: Options,
     num_threads: usize,
@@ -161,6 +166,7 @@ impl Task {
         let batch = Batch {
             threads: self.num_threads,
             indices: self.indices.as_deref(),
+            direction: self.direction,
             scores: scores.as_deref().filter(|_| self.invalid != Invalid::Pair),
             done: &done,
             ..Batch::default()

@@ -1,21 +1,20 @@
 //! What `estimate` returns: `Estimate`, with the `RunnerUp` where there is one.
 
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::Matrix6;
 use numpy::{PyArray1, PyArray2, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quest_core::RelativePose;
 use quest_core::correspondence::Usable;
 use quest_core::robust::{self, Evidence, Model};
 use quest_core::tangent::Tangent;
 
-use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
-use crate::pose::{Pose, PoseState};
+use crate::errors::{self, QuestError, ShapeMismatch};
+use crate::pose::{Pose, PoseState, RelativePose, with_base};
 use crate::solve::Views;
-use crate::{arrays, camera, html};
+use crate::{arrays, html};
 
 /// Another pose that the matches of an estimate may mean: ``X2 = R @ X1 + t``.
-#[pyclass(frozen, eq, module = "quest_pose")]
+#[pyclass(frozen, eq, extends = RelativePose, module = "quest_pose")]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RunnerUp {
     pub(crate) pose: Pose,
@@ -31,11 +30,19 @@ type RunnerUpState = (PoseState, f64, usize);
 
 /// The runner-up that ``RunnerUp.__reduce__`` took apart.
 #[pyfunction]
-pub(crate) fn _runner_up(state: RunnerUpState) -> RunnerUp {
-    RunnerUp { pose: Pose::from_state(state.0), score: state.1, inlier_count: state.2 }
+pub(crate) fn _runner_up(py: Python<'_>, state: RunnerUpState) -> PyResult<Py<RunnerUp>> {
+    RunnerUp::from_state(state).into_python(py)
 }
 
 impl RunnerUp {
+    fn from_state((pose, score, inlier_count): RunnerUpState) -> Self {
+        Self { pose: Pose::from_state(pose), score, inlier_count }
+    }
+
+    fn into_python(self, py: Python<'_>) -> PyResult<Py<Self>> {
+        with_base(py, self.pose, self)
+    }
+
     fn state(&self) -> RunnerUpState {
         (self.pose.state(), self.score, self.inlier_count)
     }
@@ -43,42 +50,11 @@ impl RunnerUp {
 
 #[pymethods]
 impl RunnerUp {
-    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
-    #[getter]
-    #[pyo3(name = "R")]
-    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.pose.r(py)
-    }
-
-    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
-    #[getter]
-    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_wxyz(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The same quaternion scalar last.
-    #[getter]
-    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_xyzw(py)
-    }
-
-    /// float : The length of ``t``.
-    #[getter]
-    fn parallax(&self) -> f64 {
-        self.pose.parallax()
-    }
-
     /// The runner-up as plain numbers and lists, ready for ``json.dumps``.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         self.pose.write_to(&dict)?;
-        dict.set_item("parallax", self.parallax())?;
+        dict.set_item("parallax", self.pose.parallax())?;
         dict.set_item("score", self.score)?;
         dict.set_item("inlier_count", self.inlier_count)?;
         Ok(dict)
@@ -96,15 +72,14 @@ impl RunnerUp {
 
 /// One pose from matches with outliers, as ``estimate`` returns it: ``X2 = R @ X1 + t``.
 ///
-/// The mean absolute depth of the inliers over both views is 1, so that the length of ``t`` is the parallax. An estimate never
-/// changes: its arrays are fresh copies at each access.
-#[pyclass(frozen, eq, module = "quest_pose")]
+/// The mean absolute depth of the inliers over both views is 1, so that the length of ``t`` is the parallax.
+#[pyclass(frozen, eq, extends = RelativePose, module = "quest_pose")]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Estimate {
     /// str : Which model the matches support.
     ///
     /// ``"general"``, ``"planar"`` or ``"pure_rotation"`` (no translation that stands clear of the noise: ``t`` is the small
-    /// vector that is left). Of a plane, and where the camera hardly moved, there may be a second pose, the runner-up.
+    /// vector that is left). A plane may have a second pose, the runner-up, and so may a camera that hardly moved.
     #[pyo3(get)]
     pub(crate) model: String,
     pose: Pose,
@@ -116,8 +91,6 @@ pub(crate) struct Estimate {
     /// int : Samples drawn.
     #[pyo3(get)]
     pub(crate) iterations: usize,
-    /// RunnerUp or None : The pose that explains the matches nearly as well, where there is one.
-    #[pyo3(get)]
     runner_up: Option<RunnerUp>,
     evidence: [f64; 3],
     /// float : The standard deviation of the inliers' Sampson errors, in the unit of the threshold.
@@ -126,29 +99,36 @@ pub(crate) struct Estimate {
     /// int : How many matches have no bearing, such as pixels without a viewing ray; they are outliers.
     #[pyo3(get)]
     pub(crate) invalid_count: usize,
+    normal: Option<[f64; 3]>,
+    /// float : The share of false matches that the threshold accepts.
+    ///
+    /// It is measured on the points of view 1 with those of view 2 shifted against them. Above some tenths the threshold is far too
+    /// wide: is it in the unit of the points?
+    #[pyo3(get)]
+    pub(crate) false_share: f64,
+    /// int : How many matches were set aside because they did not move at all while the others did.
+    ///
+    /// They are of an overlay, or of dirt on the lens. The pose is that of the others.
+    #[pyo3(get)]
+    pub(crate) unmoved: usize,
 }
 
 /// An estimate as ``__reduce__`` takes it apart.
-pub(crate) type State =
-    (String, PoseState, Vec<f64>, Vec<bool>, f64, usize, Option<RunnerUpState>, [f64; 3], f64, usize);
+pub(crate) type State = (
+    String,
+    PoseState,
+    Vec<f64>,
+    Vec<bool>,
+    (f64, usize, f64, usize),
+    Option<RunnerUpState>,
+    [f64; 3],
+    (Option<[f64; 3]>, f64, usize),
+);
 
 /// The estimate that ``Estimate.__reduce__`` took apart.
 #[pyfunction]
-pub(crate) fn _estimate(state: State) -> Estimate {
-    let (model, pose, covariance, inliers, score, iterations, runner_up, evidence, noise_px, invalid_count) =
-        state;
-    Estimate {
-        model,
-        pose: Pose::from_state(pose),
-        covariance: Matrix6::from_iterator(covariance),
-        inliers,
-        score,
-        iterations,
-        runner_up: runner_up.map(_runner_up),
-        evidence,
-        noise_px,
-        invalid_count,
-    }
+pub(crate) fn _estimate(py: Python<'_>, state: State) -> PyResult<Py<Estimate>> {
+    Estimate::from_state(state).into_python(py)
 }
 
 impl Estimate {
@@ -176,7 +156,14 @@ impl Estimate {
             evidence: [rotation_px, planar_px, general_px],
             noise_px: found.noise_px,
             invalid_count: 0,
+            normal: found.normal,
+            false_share: found.false_share,
+            unmoved: found.unmoved,
         }
+    }
+
+    pub(crate) fn into_python(self, py: Python<'_>) -> PyResult<Py<Self>> {
+        with_base(py, self.pose, self)
     }
 
     pub(crate) fn pose(&self) -> &Pose {
@@ -193,6 +180,11 @@ impl Estimate {
 
     pub(crate) fn evidence_px(&self) -> [f64; 3] {
         self.evidence
+    }
+
+    /// The normal of the plane over its distance, where there is one.
+    pub(crate) fn plane(&self) -> Option<[f64; 3]> {
+        self.normal
     }
 
     pub(crate) fn other(&self) -> Option<&RunnerUp> {
@@ -233,20 +225,32 @@ impl Estimate {
             self.pose.state(),
             self.covariance.iter().copied().collect(),
             self.inliers.clone(),
-            self.score,
-            self.iterations,
+            (self.score, self.iterations, self.noise_px, self.invalid_count),
             self.runner_up.as_ref().map(RunnerUp::state),
             self.evidence,
-            self.noise_px,
-            self.invalid_count,
+            (self.normal, self.false_share, self.unmoved),
         )
     }
 
-    /// `[t]× R` with `|t| = 1`, zero without a translation.
-    fn unit_essential(&self) -> Matrix3<f64> {
-        let RelativePose { q_21, t_21 } = *self.pose.relative();
-        let direction = t_21.try_normalize(0.0).unwrap_or_default();
-        RelativePose::new(q_21, direction).essential()
+    pub(crate) fn from_state(state: State) -> Self {
+        let (model, pose, covariance, inliers, numbers, runner_up, evidence, about_matches) = state;
+        let (score, iterations, noise_px, invalid_count) = numbers;
+        let (normal, false_share, unmoved) = about_matches;
+        Self {
+            model,
+            pose: Pose::from_state(pose),
+            covariance: Matrix6::from_iterator(covariance),
+            inliers,
+            score,
+            iterations,
+            runner_up: runner_up.map(RunnerUp::from_state),
+            evidence,
+            noise_px,
+            invalid_count,
+            normal,
+            false_share,
+            unmoved,
+        }
     }
 
     fn covariance_rows(&self) -> Vec<[f64; 6]> {
@@ -256,46 +260,8 @@ impl Estimate {
     }
 }
 
-/// The rows of a matrix.
-fn rows(m: &Matrix3<f64>) -> Vec<[f64; 3]> {
-    // nalgebra keeps columns, NumPy rows.
-    let rows: [[f64; 3]; 3] = m.transpose().into();
-    rows.map(|row| row.map(|x| x + 0.0)).to_vec()
-}
-
 #[pymethods]
 impl Estimate {
-    /// numpy.ndarray of shape (3, 3) : The rotation from the frame of camera 1 to that of camera 2.
-    #[getter]
-    #[pyo3(name = "R")]
-    fn r<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.pose.r(py)
-    }
-
-    /// numpy.ndarray of shape (3,) : The origin of camera 1 in the frame of camera 2; its length is the parallax.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.t(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The rotation as a unit quaternion, scalar first and not negative.
-    #[getter]
-    fn quat_wxyz<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_wxyz(py)
-    }
-
-    /// numpy.ndarray of shape (4,) : The same quaternion scalar last, as SciPy and ROS have it.
-    #[getter]
-    fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.pose.quat_xyzw(py)
-    }
-
-    /// float : The length of ``t``.
-    #[getter]
-    fn parallax(&self) -> f64 {
-        self.pose.parallax()
-    }
-
     /// numpy.ndarray of shape (N,) of bool : Which matches are within the threshold and in front of both cameras.
     #[getter]
     fn inliers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
@@ -306,6 +272,20 @@ impl Estimate {
     #[getter]
     pub(crate) fn inlier_count(&self) -> usize {
         self.inliers.iter().filter(|inlier| **inlier).count()
+    }
+
+    /// RunnerUp or None : The pose that explains the matches nearly as well, where there is one.
+    #[getter]
+    fn runner_up(&self, py: Python<'_>) -> PyResult<Option<Py<RunnerUp>>> {
+        self.runner_up.clone().map(|other| other.into_python(py)).transpose()
+    }
+
+    /// numpy.ndarray of shape (3,) or None : The normal of the plane in view 1 over its distance, in the unit of ``t``.
+    ///
+    /// ``R + outer(t, normal)`` takes points of view 1 to view 2. None where the model is not ``"planar"``.
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.normal.map(|normal| normal.to_pyarray(py))
     }
 
     /// numpy.ndarray of shape (6, 6) : The covariance of the rotation vector of the rotation's error and of ``t``.
@@ -320,65 +300,6 @@ impl Estimate {
     #[getter]
     fn inlier_ratio(&self) -> f64 {
         self.inlier_count() as f64 / self.inliers.len().max(1) as f64
-    }
-
-    /// numpy.ndarray of shape (3, 3) : The essential matrix ``[t]x R`` with ``|t| = 1``, zero where ``t`` is: ``x2 @ E @ x1 = 0`` of rays.
-    #[getter]
-    #[pyo3(name = "E")]
-    fn essential<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        arrays::to_numpy(py, rows(&self.unit_essential()))
-    }
-
-    /// The fundamental matrix: ``u2 @ F @ u1 = 0`` of homogeneous pixels without distortion.
-    ///
-    /// Parameters
-    /// ----------
-    /// camera1, camera2 : Camera or what may stand for one
-    ///     The cameras of the estimate. ``camera2`` is ``camera1`` where absent.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray of shape (3, 3)
-    ///     With the Frobenius norm 1; zero where ``t`` is.
-    ///
-    /// Raises
-    /// ------
-    /// BadCamera
-    ///     For a fisheye camera, whose pixels no matrix describes.
-    #[pyo3(signature = (camera1, camera2=None))]
-    fn fundamental<'py>(
-        &self,
-        py: Python<'py>,
-        camera1: &Bound<'py, PyAny>,
-        camera2: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let first = camera::from_argument("camera1", camera1)?;
-        let second = camera2.map_or(Ok(first), |c| camera::from_argument("camera2", c))?;
-        let inverse = |name: &str, camera: &quest_core::Camera| {
-            let ((fx, fy), (cx, cy)) = (camera.focal_lengths(), camera.principal_point());
-            if camera.model().is_fisheye() {
-                return Err(BadCamera::new_err(format!(
-                    "{name} is a fisheye camera, expected one whose pixels a matrix K describes"
-                )));
-            }
-            Ok(Matrix3::new(1.0 / fx, 0.0, -cx / fx, 0.0, 1.0 / fy, -cy / fy, 0.0, 0.0, 1.0))
-        };
-        let (k1, k2) = (inverse("camera1", &first)?, inverse("camera2", &second)?);
-        let f = k2.transpose() * self.unit_essential() * k1;
-        Ok(arrays::to_numpy(py, rows(&f.try_normalize(0.0).unwrap_or_default())))
-    }
-
-    /// The pose as a matrix: ``X2 = T @ X1`` of homogeneous points.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray of shape (4, 4)
-    fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let pose = self.pose.relative();
-        let r: [[f64; 3]; 3] = pose.r_21().transpose().into();
-        let mut all: Vec<[f64; 4]> = (0..3).map(|k| [r[k][0], r[k][1], r[k][2], pose.t_21[k]]).collect();
-        all.push([0.0, 0.0, 0.0, 1.0]);
-        arrays::to_numpy(py, all)
     }
 
     /// The points of the inliers, triangulated.
@@ -499,7 +420,7 @@ impl Estimate {
         let dict = PyDict::new(py);
         dict.set_item("model", &self.model)?;
         self.pose.write_to(&dict)?;
-        dict.set_item("parallax", self.parallax())?;
+        dict.set_item("parallax", self.pose.parallax())?;
         let covariance: Vec<_> = self.covariance_rows().into_iter().map(Vec::from).collect();
         dict.set_item("covariance", covariance)?;
         dict.set_item("inliers", &self.inliers)?;
@@ -513,6 +434,9 @@ impl Estimate {
         }
         dict.set_item("evidence", evidence)?;
         dict.set_item("noise_px", self.noise_px)?;
+        dict.set_item("normal", self.normal.map(|normal| normal.to_vec()))?;
+        dict.set_item("false_share", self.false_share)?;
+        dict.set_item("unmoved", self.unmoved)?;
         if self.invalid_count > 0 {
             dict.set_item("invalid_count", self.invalid_count)?;
         }

@@ -13,6 +13,7 @@ mod estimate_batch;
 mod estimate_result;
 mod foreign_camera;
 mod html;
+mod options;
 mod paper;
 mod polynomials;
 mod pose;
@@ -55,6 +56,8 @@ mod _core {
     };
     #[pymodule_export]
     use crate::polynomials::_solve_polynomials;
+    #[pymodule_export]
+    use crate::pose::RelativePose;
     #[pymodule_export]
     use crate::servo::{_command, CameraServo, Command, Controller, RobotServo, joint_velocities};
     #[pymodule_export]

@@ -71,7 +71,7 @@ pub(crate) fn solve(
     solver: Option<&str>,
     kinds: &str,
     feasibility: &str,
-) -> PyResult<Vec<Candidate>> {
+) -> PyResult<Vec<Py<Candidate>>> {
     let solver = solver_named(solver)?;
     let feasibility: Feasibility =
         feasibility.parse().map_err(|error: UnknownFeasibility| QuestError::new_err(error.to_string()))?;
@@ -90,7 +90,7 @@ pub(crate) fn solve(
     });
     match solved.map_err(|error| errors::input(&error))? {
         (candidates, Some(degeneracy)) if candidates.is_empty() => Err(errors::degenerate(degeneracy)),
-        (candidates, _) => Ok(candidates),
+        (candidates, _) => candidates.into_iter().map(|candidate| candidate.into_python(py)).collect(),
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct Supervisor<'a> {
 }
 
 impl<'a> Supervisor<'a> {
-    /// Of work on `total` things, of whose progress a callable is told: how many are done, and how many there are.
+    /// A supervisor of work on `total` things. The callable is told how many are done, and how many there are.
     pub(crate) fn new(progress: Option<&'a Py<PyAny>>, total: usize) -> Self {
         Self {
             progress,
@@ -60,7 +60,7 @@ impl<'a> Supervisor<'a> {
         Ok(result)
     }
 
-    /// So many things are done, of so many.
+    /// Sets how many things are done, and how many there are.
     pub(crate) fn set(&self, done: usize, total: usize) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);

@@ -60,6 +60,8 @@ def test_columns_are_those_of_the_batch() -> None:
         assert one["covariance"] == expected.covariance.ravel().tolist()
         assert one["inliers"] == expected.inliers.tolist()
         assert one["model"] == expected.model
+        assert one["normal"] == (None if expected.normal is None else expected.normal.tolist())
+        assert (one["false_share"], one["unmoved"]) == (expected.false_share, expected.unmoved)
         assert (one["runner_up_t"] is None) == (expected.runner_up is None)
 
 

@@ -155,6 +155,7 @@ def test_values() -> None:
         with pytest.raises(AttributeError):
             value.score = 1.0
     keys = "model q_21 R_21 t_21 parallax covariance inliers inlier_count score iterations runner_up evidence noise_px"
+    keys += " normal false_share unmoved"
     assert list(est.to_dict()) == keys.split()
 
 

@@ -9,8 +9,8 @@ use quest_colmap::{
 };
 use quest_io::Output;
 
-use super::Shown;
-use crate::{Failure, Outcome, words};
+use super::{OfColmap, Shown};
+use crate::{Failure, Outcome, estimate_options::EstimateOptions, words};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -36,15 +36,11 @@ pub(super) struct Arguments {
     /// Only the pairs of this file: the names of two images a line.
     #[arg(long, value_name = "FILE")]
     pairs: Option<PathBuf>,
-    /// Matches with a Sampson error below this are inliers, in pixels: of poses.
-    #[arg(long, value_name = "PX", allow_negative_numbers = true, default_value_t = VerifyOptions::default().threshold)]
-    threshold: f64,
+    #[command(flatten)]
+    search: EstimateOptions<OfColmap>,
     /// Pairs with fewer inliers have no pose.
     #[arg(long, value_name = "N", default_value_t = VerifyOptions::default().min_inliers)]
     min_inliers: usize,
-    /// The seed of the samples.
-    #[arg(long, value_name = "S", default_value_t = 0)]
-    seed: u64,
     /// Write to this file, whole or not at all.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -84,9 +80,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         }
         What::Poses => {
             let options = VerifyOptions {
-                threshold: arguments.threshold,
+                search: arguments.search.for_colmap(),
                 min_inliers: arguments.min_inliers,
-                seed: arguments.seed,
                 ..VerifyOptions::default()
             };
             let (edges, mut exported) = export_poses(&database, &pairs, &options, &shown)?;

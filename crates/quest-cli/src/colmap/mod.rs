@@ -6,9 +6,14 @@ mod verify;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, Subcommand};
-use quest_colmap::Watch;
+use quest_colmap::{VerifyOptions, Watch};
+use quest_core::robust::Options;
 
-use crate::{Failure, Outcome, progress::Progress};
+use crate::{
+    Failure, Outcome,
+    estimate_options::{Defaults, EstimateOptions},
+    progress::Progress,
+};
 
 /// Verify and export the image pairs of COLMAP databases.
 #[derive(Args, Debug)]
@@ -27,6 +32,26 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match &arguments.command {
         Command::Verify(arguments) => verify::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+    }
+}
+
+/// The options of a search where those of COLMAP are not given.
+#[derive(Clone, Debug)]
+struct OfColmap;
+
+impl Defaults for OfColmap {
+    const THRESHOLD: &'static str =
+        "Matches with a Sampson error below this are inliers, in pixels [default: 4]";
+
+    fn options() -> Options {
+        VerifyOptions::default().search
+    }
+}
+
+impl EstimateOptions<OfColmap> {
+    /// The options for the pairs of a database, which number themselves.
+    fn for_colmap(&self) -> Options {
+        self.options(self.threshold.unwrap_or(OfColmap::options().threshold), 0)
     }
 }
 

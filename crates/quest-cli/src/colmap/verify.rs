@@ -9,9 +9,10 @@ use quest_colmap::{
 };
 use quest_io::Output;
 
-use super::Shown;
+use super::{OfColmap, Shown};
 use crate::{
     Failure, Outcome,
+    estimate_options::EstimateOptions,
     options::{Format, OutputOptions},
     rows,
 };
@@ -48,21 +49,14 @@ pub(super) struct Arguments {
     /// Only the pairs of this file: the names of two images a line.
     #[arg(long, value_name = "FILE")]
     pairs: Option<PathBuf>,
-    /// Matches with a Sampson error below this are inliers, in pixels.
-    #[arg(long, value_name = "PX", allow_negative_numbers = true, default_value_t = VerifyOptions::default().threshold)]
-    threshold: f64,
     /// Pairs with fewer inliers have no pose.
     #[arg(long, value_name = "N", default_value_t = VerifyOptions::default().min_inliers)]
     min_inliers: usize,
     /// Pairs with a smaller part of inliers have no pose.
     #[arg(long, value_name = "R", allow_negative_numbers = true, default_value_t = VerifyOptions::default().min_inlier_ratio)]
     min_inlier_ratio: f64,
-    /// How sure to be that a sample without outliers was seen.
-    #[arg(long, value_name = "P", allow_negative_numbers = true, default_value_t = VerifyOptions::default().confidence)]
-    confidence: f64,
-    /// Draw at most so many samples a pair.
-    #[arg(long, value_name = "N", default_value_t = VerifyOptions::default().max_iterations)]
-    max_iterations: usize,
+    #[command(flatten)]
+    search: EstimateOptions<OfColmap>,
     /// Replace the rows of pairs that have been verified before.
     #[arg(long, conflicts_with = "resume")]
     overwrite: bool,
@@ -78,9 +72,6 @@ pub(super) struct Arguments {
     /// The number of threads, 0 for all of the machine's.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// The seed of the samples.
-    #[arg(long, value_name = "S", default_value_t = 0)]
-    seed: u64,
     /// Write nothing into the database.
     #[arg(long)]
     dry_run: bool,
@@ -125,11 +116,9 @@ impl Arguments {
     fn options(&self) -> Result<VerifyOptions, Failure> {
         Ok(VerifyOptions {
             pairs: self.pairs.as_deref().map(read_pairs).transpose()?,
-            threshold: self.threshold,
+            search: self.search.for_colmap(),
             min_inliers: self.min_inliers,
             min_inlier_ratio: self.min_inlier_ratio,
-            confidence: self.confidence,
-            max_iterations: self.max_iterations,
             existing: match (self.overwrite, self.resume) {
                 (true, _) => Existing::Overwrite,
                 (_, true) => Existing::Resume,
@@ -141,7 +130,6 @@ impl Arguments {
             },
             watermark: self.watermark,
             threads: self.threads,
-            seed: self.seed,
             dry_run: self.dry_run,
         })
     }

@@ -61,7 +61,7 @@ fn a_planted_pose_is_found_among_outliers() {
 fn the_keys_are_those_of_the_interface() {
     let (_, result) = estimated(&pair([0.5, 0.1, -0.2], 60, false), &[]);
     let keys: Vec<_> = result.as_object().unwrap().keys().map(String::as_str).collect();
-    let all = "model q_21 R_21 t_21 parallax covariance inliers inlier_count score iterations runner_up evidence elapsed_ms \
+    let all = "model q_21 R_21 t_21 parallax covariance inliers inlier_count score iterations runner_up evidence normal false_share unmoved elapsed_ms \
                rotation_error_deg translation_error_deg";
     assert!(all.split(' ').all(|key| keys.contains(&key)), "{keys:?}");
 }
@@ -261,4 +261,70 @@ fn a_third_view_decides_between_the_poses_of_a_plane() {
     let missing = run_in(folder.path(), &["estimate", "12.json", "--third", "14.json"], b"");
     assert_eq!(missing.status, 2);
     assert!(missing.stderr.contains("14.json"), "{}", missing.stderr);
+}
+
+#[test]
+fn every_search_takes_the_same_options() {
+    let options = |arguments: &[&str]| -> Vec<String> {
+        let help = run(arguments).stdout;
+        let all = help.lines().filter_map(|line| line.trim_start().split_once("--"));
+        all.map(|(_, rest)| rest.split([' ', ',']).next().unwrap_or_default().to_owned()).collect()
+    };
+    let [estimate, verify, export] = [
+        options(&["estimate", "--help"]),
+        options(&["colmap", "verify", "--help"]),
+        options(&["colmap", "export", "--help"]),
+    ];
+    let searching = [
+        "threshold",
+        "confidence",
+        "min-iterations",
+        "max-iterations",
+        "max-false-alarms",
+        "seed",
+        "solver",
+        "loss",
+    ];
+    for option in searching {
+        let has = |all: &[String]| all.iter().any(|one| one == option);
+        assert!(has(&estimate), "estimate --{option}: {estimate:?}");
+        if cfg!(feature = "colmap") {
+            assert!(has(&verify) && has(&export), "colmap --{option}: {verify:?} {export:?}");
+        }
+    }
+}
+
+#[test]
+fn at_least_and_at_most_so_many_samples_are_drawn() {
+    let pair = pair([0.5, 0.1, -0.2], 90, false);
+    let iterations = |arguments: &[&str]| estimated(&pair, arguments).1["iterations"].as_u64().unwrap();
+    assert!(iterations(&["--min-iterations", "2000"]) >= 2000);
+    assert!(iterations(&["--min-iterations", "1", "--max-iterations", "20"]) <= 20);
+}
+
+#[test]
+fn an_initial_pose_needs_no_sample() {
+    let pair = pair([0.5, 0.1, -0.2], 90, true);
+    let limits = ["--min-iterations", "1", "--max-iterations", "1", "--initial-pose"];
+    let (run, result) = estimated(&pair, &[&limits[..], &["1,0.001,0,0,0.5,0.1,-0.2"]].concat());
+    assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+    assert!(
+        result["rotation_error_deg"].as_f64().unwrap() < 1e-6 && result["inlier_count"].as_u64() >= Some(60)
+    );
+    let (run, _) = estimated(&pair, &["--initial-pose", "1,0,0"]);
+    assert!(run.status == 2 && run.stderr.contains("W,X,Y,Z,TX,TY,TZ"), "{}", run.stderr);
+    let line = pair.to_string() + "\n";
+    let arguments = ["estimate", "-", "--input-format", "jsonl", "--initial-pose", "1,0,0,0,1,0,0"];
+    let run = run_in(Path::new("."), &arguments, line.as_bytes());
+    assert!(run.status == 2 && run.stderr.contains("JSON Lines and --initial-pose"), "{}", run.stderr);
+}
+
+#[test]
+fn a_known_direction_rules_poses_out() {
+    let pair = pair([0.5, 0.1, -0.2], 90, true);
+    let (run, result) = estimated(&pair, &["--known-direction", "0,1,0,2"]);
+    assert!(run.status == 0 && result["rotation_error_deg"].as_f64().unwrap() < 1e-6, "{}", run.stderr);
+    // Nothing turned: no pose of these matches takes x to y.
+    let (run, result) = estimated(&pair, &["--known-direction", "1,0,0,0,1,0,5", "--max-iterations", "2000"]);
+    assert_eq!((run.status, &result["model"]), (1, &Value::Null), "{}", run.stderr);
 }

@@ -135,13 +135,8 @@ impl Usable {
             return Ok(Err(format!("found {found} matches, expected at least {needed}")));
         }
         let [camera1, camera2] = &input.cameras;
-        let search = Options {
-            confidence: options.confidence,
-            max_iterations: options.max_iterations,
-            seed: options.seed,
-            index: key.0.cast_unsigned(),
-            ..Options::in_pixels(options.threshold, camera1, camera2)
-        };
+        let index = key.0.cast_unsigned();
+        let search = Options { index, ..options.search.clone() }.with_cameras(camera1, camera2);
         match robust::estimate_until(&self.matches, &search, &Priors::default(), is_cancelled) {
             Err(EstimateError::Cancelled) => Err(ColmapError::Cancelled),
             other => Ok(other.map_err(|error| error.to_string())),
@@ -240,7 +235,7 @@ impl Input {
             Model::Planar | Model::PureRotation => (Kind::Homography, Config::PlanarOrPanoramic),
             _ => (Kind::Fundamental, Config::Uncalibrated),
         };
-        let fitted = pixel_fit::fit(kind, &pixels, &estimate.inliers, options.threshold)
+        let fitted = pixel_fit::fit(kind, &pixels, &estimate.inliers, options.search.threshold)
             .ok_or("no matrix fits the pixels of the inliers")?;
         let places = usable.chosen(&fitted.inliers);
         self.check(places.len(), options)?;

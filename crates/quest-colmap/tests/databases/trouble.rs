@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use quest_colmap::{ColmapError, Database, Existing, VerifyOptions, Watch, verify};
+use quest_core::robust::Options;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -112,7 +113,12 @@ fn no_pair_spoils_another() {
     connection.execute("UPDATE keypoints SET data = ?1 WHERE image_id = 4", [data]).unwrap();
     let run = |planted: &Planted| {
         let mut database = Database::open(&planted.path).unwrap();
-        let report = verify(&mut database, &VerifyOptions { seed: SEED, ..options() }, &()).unwrap();
+        let report = verify(
+            &mut database,
+            &VerifyOptions { search: Options { seed: SEED, ..options().search }, ..options() },
+            &(),
+        )
+        .unwrap();
         (report, rows(&planted.connection(), true))
     };
     let ((_, all), (report, some)) = (run(&clean), run(&spoiled));

@@ -1,6 +1,6 @@
 //! Many pairs at once.
 
-use super::{Estimate, EstimateError, Options, Priors, estimate_until};
+use super::{Estimate, EstimateError, KnownDirection, Options, Priors, estimate_until};
 use crate::Correspondence;
 
 /// One pair of a batch.
@@ -22,6 +22,8 @@ pub struct Batch<'a> {
     pub indices: Option<&'a [u64]>,
     /// The scores of the matches of each pair, `None` for a pair without, as [`Priors::scores`].
     pub scores: Option<&'a [Option<&'a [f64]>]>,
+    /// A direction that both cameras of every pair know.
+    pub direction: Option<KnownDirection>,
     /// Asked by every thread, often: once it says yes, the pairs without an answer have [`EstimateError::Cancelled`].
     pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
     /// Told by every thread of each pair that it has worked on.
@@ -29,19 +31,27 @@ pub struct Batch<'a> {
 }
 
 impl Default for Batch<'_> {
-    /// All threads of the machine, no keys, no scores; nothing ends it early.
+    /// All threads of the machine, no keys, no scores, no direction; nothing ends it early.
     fn default() -> Self {
-        Self { threads: 0, indices: None, scores: None, is_cancelled: &|| false, done: &|| () }
+        Self {
+            threads: 0,
+            indices: None,
+            scores: None,
+            direction: None,
+            is_cancelled: &|| false,
+            done: &|| (),
+        }
     }
 }
 
 impl std::fmt::Debug for Batch<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { threads, indices, scores, .. } = self;
+        let Self { threads, indices, scores, direction, .. } = self;
         f.debug_struct("Batch")
             .field("threads", threads)
             .field("indices", indices)
             .field("scores", scores)
+            .field("direction", direction)
             .finish_non_exhaustive()
     }
 }
@@ -92,7 +102,7 @@ impl Batch<'_> {
         let index = options.index.wrapping_add(key);
         let options = Options { focal_lengths: problem.focal_lengths, index, ..options.clone() };
         let scores = self.scores.and_then(|scores| scores[place]);
-        let priors = Priors { scores, ..Priors::default() };
+        let priors = Priors { scores, direction: self.direction, ..Priors::default() };
         let found = estimate_until(problem.matches, &options, &priors, self.is_cancelled);
         (self.done)();
         found

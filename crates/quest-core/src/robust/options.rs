@@ -21,16 +21,16 @@ pub struct Options {
     /// `fx, fy` of view 1 and of view 2, in pixels. With all of them 1 the threshold is in units of the plane `z = 1`, or
     /// in radians for bearings.
     pub focal_lengths: [[f64; 2]; 2],
-    /// What a match counts in the search, by how far it is off.
+    /// How the search scores a residual: `Marginalised` over all thresholds up to one, or `Truncated` at one (MSAC).
     pub loss: SearchScore,
     /// How sure the search is to be that it has seen a good sample before it stops, in `(0, 1)`.
     pub confidence: f64,
-    /// At least so many samples are drawn.
+    /// At least this many samples are drawn.
     pub min_iterations: usize,
-    /// At most so many samples are drawn.
+    /// At most this many samples are drawn.
     pub max_iterations: usize,
-    /// The best pose is returned if at most so many poses as good as it are to be expected where all matches are false:
-    /// lower to be surer that it is none of those, infinite to have it whatever chance explains.
+    /// The best pose is returned if at most this many poses as good as it are expected where all matches are false. A smaller
+    /// number refuses more poses of chance; infinity returns the best pose whatever chance explains.
     pub max_false_alarms: f64,
     /// The same seed gives the same answer, bit for bit.
     pub seed: u64,
@@ -75,7 +75,11 @@ impl Options {
         Self { focal_lengths, ..self }
     }
 
-    pub(super) fn check(&self) -> Result<(), EstimateError> {
+    /// Whether an estimate can be made with these options: every estimate asks first.
+    ///
+    /// # Errors
+    /// [`EstimateError::Option`] for the first that is impossible.
+    pub fn check(&self) -> Result<(), EstimateError> {
         let refuse = |option, found, expected| Err(EstimateError::Option { option, found, expected });
         if !(self.threshold > 0.0 && self.threshold.is_finite()) {
             return refuse("threshold", self.threshold, "a positive finite number");
@@ -117,7 +121,7 @@ pub struct KnownDirection {
     pub in_view1: Vector3<f64>,
     /// In the frame of camera 2; the same as in view 1 for the axis of the rotation.
     pub in_view2: Vector3<f64>,
-    /// Poses that turn the first further than this from the second, in radians, are not considered.
+    /// A pose that turns the first direction further than this from the second, in radians, is not considered.
     pub tolerance: f64,
 }
 

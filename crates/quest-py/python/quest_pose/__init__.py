@@ -21,8 +21,10 @@ image pairs of COLMAP databases, ``quest_pose.compat`` takes the place of other 
 answer a ``NoAnswer``; what is no array of numbers at all is a ``TypeError``.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +40,7 @@ from quest_pose._core import (
     NoPose,
     NotFinite,
     QuestError,
+    RelativePose,
     RunnerUp,
     ShapeMismatch,
     TooFewMatches,
@@ -51,7 +54,11 @@ from quest_pose._core import (
     estimate_batch,
     solve,
 )
+from quest_pose._options import EstimateOptions
 from quest_pose._polynomials import PolynomialSolutions, solve_polynomials
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 __all__ = [
     "BadCamera",
@@ -61,11 +68,13 @@ __all__ = [
     "DegenerateInput",
     "Estimate",
     "EstimateBatch",
+    "EstimateOptions",
     "NoAnswer",
     "NoPose",
     "NotFinite",
     "PolynomialSolutions",
     "QuestError",
+    "RelativePose",
     "RunnerUp",
     "ShapeMismatch",
     "SolvedBatch",
@@ -194,11 +203,7 @@ def third_view(
     camera1: Camera | ArrayLike | None = None,
     camera2: Camera | ArrayLike | None = None,
     camera3: Camera | ArrayLike | None = None,
-    *,
-    threshold: float | None = None,
-    confidence: float = 0.9999,
-    max_iterations: int = 100_000,
-    seed: int = 0,
+    **options: Unpack[EstimateOptions],
 ) -> ThirdView:
     """The poses from view 1 to views 2 and 3; where one of two views is ambiguous, the other decides.
 
@@ -211,8 +216,8 @@ def third_view(
         The same N points in three views, as for ``estimate``.
     camera1, camera2, camera3 : Camera or array_like of shape (3, 3), optional
         The cameras, or their matrices K. The second and the third are ``camera1`` where absent.
-    threshold, confidence, max_iterations, seed
-        As for ``estimate``.
+    options
+        As for ``estimate``: the keywords of ``EstimateOptions`` but for ``index``.
 
     Returns
     -------
@@ -225,8 +230,7 @@ def third_view(
     NoPose, TooFewMatches, NotFinite, ShapeMismatch, DegenerateInput, BadCamera, QuestError
         As ``estimate``, for either pair.
     """
-    cameras = (camera1, camera2, camera3)
-    first, second, decision = _third_view(x1, x2, x3, cameras, threshold, confidence, max_iterations, seed)
+    first, second, decision = _third_view(x1, x2, x3, (camera1, camera2, camera3), options)
     return ThirdView(first, second, *(decision or (None, None, None)))
 
 

@@ -1,10 +1,12 @@
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import NotRequired, disjoint_base
+from typing_extensions import NotRequired, Unpack, disjoint_base
+
+from quest_pose._options import EstimateOptions
 
 __all__ = [
     "BadCamera",
@@ -20,6 +22,7 @@ __all__ = [
     "NoPose",
     "NotFinite",
     "QuestError",
+    "RelativePose",
     "RobotServo",
     "RunnerUp",
     "ShapeMismatch",
@@ -103,6 +106,23 @@ class Camera:
     def __hash__(self) -> int: ...
     def __getnewargs_ex__(self) -> tuple[tuple[str, Sequence[float]], dict[str, int | None]]: ...
 
+@disjoint_base
+class RelativePose:
+    @property
+    def R(self) -> _Array: ...
+    @property
+    def t(self) -> _Array: ...
+    @property
+    def quat_wxyz(self) -> _Array: ...
+    @property
+    def quat_xyzw(self) -> _Array: ...
+    @property
+    def parallax(self) -> float: ...
+    @property
+    def E(self) -> _Array: ...
+    def matrix(self) -> _Array: ...
+    def fundamental(self, camera1: _AnyCamera, camera2: _AnyCamera = None) -> _Array: ...
+
 @type_check_only
 class _CandidateDict(TypedDict):
     kind: _Kind
@@ -116,17 +136,9 @@ class _CandidateDict(TypedDict):
     feasible: bool
 
 @final
-class Candidate:
+class Candidate(RelativePose):
     @property
     def kind(self) -> _Kind: ...
-    @property
-    def R(self) -> _Array: ...
-    @property
-    def t(self) -> _Array: ...
-    @property
-    def quat_wxyz(self) -> _Array: ...
-    @property
-    def quat_xyzw(self) -> _Array: ...
     @property
     def depths1(self) -> _Array: ...
     @property
@@ -172,19 +184,12 @@ class _EstimateDict(_RunnerUpDict):
     runner_up: _RunnerUpDict | None
     evidence: dict[str, float | None]
     noise_px: float
+    normal: list[float] | None
+    false_share: float
+    unmoved: int
 
 @final
-class RunnerUp:
-    @property
-    def R(self) -> _Array: ...
-    @property
-    def t(self) -> _Array: ...
-    @property
-    def quat_wxyz(self) -> _Array: ...
-    @property
-    def quat_xyzw(self) -> _Array: ...
-    @property
-    def parallax(self) -> float: ...
+class RunnerUp(RelativePose):
     @property
     def score(self) -> float: ...
     @property
@@ -196,19 +201,9 @@ class RunnerUp:
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
-class Estimate:
+class Estimate(RelativePose):
     @property
     def model(self) -> _Model: ...
-    @property
-    def R(self) -> _Array: ...
-    @property
-    def t(self) -> _Array: ...
-    @property
-    def quat_wxyz(self) -> _Array: ...
-    @property
-    def quat_xyzw(self) -> _Array: ...
-    @property
-    def parallax(self) -> float: ...
     @property
     def covariance(self) -> _Array: ...
     @property
@@ -228,11 +223,13 @@ class Estimate:
     @property
     def invalid_count(self) -> int: ...
     @property
-    def inlier_ratio(self) -> float: ...
+    def normal(self) -> _Array | None: ...
     @property
-    def E(self) -> _Array: ...
-    def fundamental(self, camera1: _AnyCamera, camera2: _AnyCamera = None) -> _Array: ...
-    def matrix(self) -> _Array: ...
+    def false_share(self) -> float: ...
+    @property
+    def unmoved(self) -> int: ...
+    @property
+    def inlier_ratio(self) -> float: ...
     def points(
         self, x1: ArrayLike, x2: ArrayLike, camera1: _AnyCamera = None, camera2: _AnyCamera = None
     ) -> _Array: ...
@@ -289,6 +286,12 @@ class EstimateBatch:
     @property
     def noise_px(self) -> _Array: ...
     @property
+    def normal(self) -> _Array: ...
+    @property
+    def false_share(self) -> _Array: ...
+    @property
+    def unmoved(self) -> _Counts: ...
+    @property
     def evidence(self) -> _Array: ...
     @property
     def runner_up_R(self) -> _Array: ...
@@ -314,19 +317,11 @@ def estimate(
     camera1: _AnyCamera = None,
     camera2: _AnyCamera = None,
     *,
-    threshold: float | None = None,
-    confidence: float = 0.9999,
-    min_iterations: int = 300,
-    max_iterations: int = 100_000,
-    max_false_alarms: float = 0.03,
-    seed: int = 0,
-    index: int = 0,
-    solver: str | None = None,
-    loss: Literal["marginalised", "truncated"] = "marginalised",
     scores: ArrayLike | None = None,
     initial_pose: tuple[ArrayLike, ArrayLike] | None = None,
     known_direction: tuple[ArrayLike, ArrayLike, float] | None = None,
     invalid: _Invalid = "outlier",
+    **options: Unpack[EstimateOptions],
 ) -> Estimate: ...
 def estimate_batch(
     x1: ArrayLike,
@@ -335,20 +330,14 @@ def estimate_batch(
     cameras1: _AnyCamera | Sequence[_AnyCamera] = None,
     cameras2: _AnyCamera | Sequence[_AnyCamera] = None,
     *,
-    threshold: float | None = None,
-    confidence: float = 0.9999,
-    min_iterations: int = 300,
-    max_iterations: int = 100_000,
-    max_false_alarms: float = 0.03,
-    seed: int = 0,
     first_index: int = 0,
-    solver: str | None = None,
-    loss: Literal["marginalised", "truncated"] = "marginalised",
     num_threads: int = 0,
     scores: ArrayLike | None = None,
     indices: ArrayLike | None = None,
     invalid: _Invalid = "outlier",
     progress: Callable[[int, int], object] | None = None,
+    known_direction: tuple[ArrayLike, ArrayLike, float] | None = None,
+    **options: Unpack[EstimateOptions],
 ) -> EstimateBatch: ...
 def _estimate(state: tuple[Any, ...]) -> Estimate: ...
 def _estimate_batch(state: tuple[Any, ...]) -> EstimateBatch: ...
@@ -358,10 +347,7 @@ def _third_view(
     x2: ArrayLike,
     x3: ArrayLike,
     cameras: Sequence[Camera | ArrayLike | None],
-    threshold: float | None,
-    confidence: float,
-    max_iterations: int,
-    seed: int,
+    options: Mapping[str, Any],
 ) -> tuple[Estimate, Estimate, tuple[float, float, float] | None]: ...
 def constraint_matrix(x1: ArrayLike, x2: ArrayLike) -> _Array: ...
 def _solve_batch(
@@ -580,18 +566,15 @@ def joint_velocities(
 def _colmap_verify(
     database: _Path,
     pairs: _Names | None,
-    threshold: float,
     min_inliers: int,
     min_inlier_ratio: float,
-    confidence: float,
-    max_iterations: int,
     existing: str,
     uncalibrated: str,
     watermark: float,
     num_threads: int,
-    seed: int,
     dry_run: bool,
     progress: Callable[[int, int], object] | None,
+    options: Mapping[str, Any],
 ) -> str: ...
 def _colmap_read_pairs(path: _Path) -> _Names: ...
 def _colmap_write(
@@ -602,8 +585,7 @@ def _colmap_export(
     target: _Path,
     what: str,
     pairs: _Names | None,
-    threshold: float,
     min_inliers: int,
-    seed: int,
     progress: Callable[[int, int], object] | None,
+    options: Mapping[str, Any],
 ) -> tuple[int, _Names]: ...

@@ -13,7 +13,7 @@ params1, params2        list of double, with the cameras   COLMAP's parameters
 score                   list of float, optional            one a match, higher is better
 ======================= ================================== ==========================================================
 
-Other columns are left out. Columns out: ``SCHEMA_OUT``.
+Other columns are left out. Columns out: ``schema_out()``.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -71,6 +71,9 @@ def schema_out() -> "pyarrow.Schema":
             ("inliers", pa.list_(pa.bool_())),
             ("runner_up_q_wxyz", vector(4)),
             ("runner_up_t", vector(3)),
+            ("normal", vector(3)),
+            ("false_share", pa.float64()),
+            ("unmoved", pa.int64()),
         ]
     )
 
@@ -187,6 +190,7 @@ def _cameras(table: Any, model: str, params: str) -> list[Camera]:
 def _record_batch(pa: Any, keys: Any, found: EstimateBatch) -> Any:
     absent = ~found.found
     other = np.isnan(found.runner_up_t[:, 0]) if len(found) else absent
+    no_plane = np.isnan(found.normal[:, 0]) if len(found) else absent
 
     def vectors(values: Any, mask: Any) -> Any:
         flat = np.ascontiguousarray(values).reshape(len(found), values.shape[1])
@@ -210,5 +214,8 @@ def _record_batch(pa: Any, keys: Any, found: EstimateBatch) -> Any:
         inliers,
         vectors(found.runner_up_quat_wxyz, other),
         vectors(found.runner_up_t, other),
+        vectors(found.normal, no_plane),
+        pa.array(found.false_share, mask=absent),
+        pa.array(found.unmoved.astype(np.int64)),
     ]
     return pa.RecordBatch.from_arrays(columns, schema=schema_out())

@@ -10,11 +10,13 @@ It stands where COLMAP's own verification does, ahead of the mapper. In hloc one
     pycolmap.verify_matches = quest_pose.colmap.verify_matches
 """
 
+from __future__ import annotations
+
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 from quest_pose._core import (
     Estimate,
@@ -34,6 +36,14 @@ __all__ = [
     "verify_matches",
     "write_two_view_geometries",
 ]
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from quest_pose._options import EstimateOptions
+
+_SEARCH = {"threshold": 4.0, "confidence": 0.999, "max_iterations": 10_000}
+"""COLMAP's own: what is not given."""
 
 _Path: TypeAlias = str | os.PathLike[str]
 _Pairs: TypeAlias = _Path | Iterable[tuple[str, str]]
@@ -55,18 +65,15 @@ def verify(
     database: _Path,
     *,
     pairs: _Pairs | None = None,
-    threshold: float = 4.0,
     min_inliers: int = 15,
     min_inlier_ratio: float = 0.0,
-    confidence: float = 0.999,
-    max_iterations: int = 10_000,
     existing: Literal["raise", "overwrite", "resume"] = "raise",
     uncalibrated: Literal["skip", "guess"] = "skip",
     watermark: float = 0.7,
     num_threads: int = 0,
-    seed: int = 0,
     dry_run: bool = False,
     progress: _Progress | None = None,
+    **options: Unpack[EstimateOptions],
 ) -> Report:
     """The two-view geometries of a database: all rows are written in one transaction, or none.
 
@@ -76,14 +83,9 @@ def verify(
         A database of COLMAP 3.6 to 4.2; it is not migrated. Only ``two_view_geometries`` is written.
     pairs : path or iterable of (str, str), optional
         The names of the images of the pairs, or a file with two names a line; all pairs with matches where absent.
-    threshold : float
-        Matches with a Sampson error below this are inliers, in pixels. COLMAP's 4 gives as many points, 2 purer inliers.
     min_inliers : int
     min_inlier_ratio : float
         Pairs with fewer inliers, or a smaller part of them, get an empty row.
-    confidence : float
-    max_iterations : int
-        As for ``estimate``.
     existing : {"raise", "overwrite", "resume"}
         What to do with pairs that have a row: refuse to begin, replace it, or leave it and verify the others.
     uncalibrated : {"skip", "guess"}
@@ -93,12 +95,14 @@ def verify(
         The part of the inliers that one shift of the images' border has to explain for a watermark; above 1 for never.
     num_threads : int
         All of the machine's for 0. It changes no row.
-    seed : int
-        The same seed gives the same rows, whichever other pairs there are.
     dry_run : bool
         Whether to write nothing.
     progress : callable, optional
         Called with the number of pairs that are done and that of all. An exception ends the run, which writes nothing.
+    options
+        As for ``estimate``: the keywords of ``EstimateOptions`` but for ``index``, with COLMAP's ``threshold`` of 4 pixels,
+        ``confidence`` of 0.999 and ``max_iterations`` of 10,000 where they are absent. A threshold of 4 gives as many points as
+        COLMAP, 2 purer inliers. The same ``seed`` gives the same rows, whichever other pairs there are.
 
     Returns
     -------
@@ -115,8 +119,8 @@ def verify(
     The lock of the interpreter is released; Ctrl-C ends the run, and the database is as it was.
     """
     text = _colmap_verify(
-        database, _named(pairs), threshold, min_inliers, min_inlier_ratio, confidence, max_iterations, existing,
-        uncalibrated, watermark, num_threads, seed, dry_run, progress,
+        database, _named(pairs), min_inliers, min_inlier_ratio, existing, uncalibrated, watermark, num_threads, dry_run,
+        progress, _SEARCH | {**options},
     )  # fmt: skip
     report = json.loads(text)
     return Report(report["summary"], report["pairs"])
@@ -213,7 +217,7 @@ def export_matches(database: _Path, target: _Path, *, pairs: _Pairs | None = Non
     list of (str, str)
         The pairs that were left out, and why.
     """
-    return _export(database, target, "matches", pairs, 4.0, 15, 0)
+    return _export(database, target, "matches", pairs, 15, {})
 
 
 def export_poses(
@@ -221,26 +225,25 @@ def export_poses(
     target: _Path,
     *,
     pairs: _Pairs | None = None,
-    threshold: float = 4.0,
     min_inliers: int = 15,
-    seed: int = 0,
+    **options: Unpack[EstimateOptions],
 ) -> list[tuple[str, str]]:
-    """Writes poses with their covariances as a graph in g2o's form, every pair estimated again.
+    """Writes poses with their covariances as a graph in g2o's form, every pair estimated again, with the options of ``verify``.
 
     Returns
     -------
     list of (str, str)
         The pairs that were left out, and why.
     """
-    return _export(database, target, "poses", pairs, threshold, min_inliers, seed)
+    return _export(database, target, "poses", pairs, min_inliers, _SEARCH | {**options})
 
 
 def _export(
-    database: _Path, target: _Path, what: str, pairs: _Pairs | None, threshold: float, min_inliers: int, seed: int
+    database: _Path, target: _Path, what: str, pairs: _Pairs | None, min_inliers: int, options: dict[str, Any]
 ) -> list[tuple[str, str]]:
     part = Path(f"{os.fspath(target)}.part")
     try:
-        _, left = _colmap_export(database, part, what, _named(pairs), threshold, min_inliers, seed, None)
+        _, left = _colmap_export(database, part, what, _named(pairs), min_inliers, None, options)
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)
