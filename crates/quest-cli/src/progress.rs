@@ -44,7 +44,7 @@ impl Progress {
         self.bar.set_length(total);
     }
 
-    /// So many more are done.
+    /// Adds to the number that is done.
     pub(crate) fn add(&self, count: u64) {
         if self.is_wanted && self.start.elapsed() > PATIENCE {
             self.shown.call_once(|| self.bar.set_draw_target(ProgressDrawTarget::stderr()));

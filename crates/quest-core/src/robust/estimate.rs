@@ -73,8 +73,8 @@ pub struct Estimate {
     /// the translation.
     #[cfg_attr(feature = "serde", serde(with = "crate::serial::rows"))]
     pub covariance: Matrix6<f64>,
-    /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order. Of matches that
-    /// share a keypoint only the one that agrees best is, with its copies.
+    /// Which matches are within the threshold of the pose and in front of both cameras, in the caller's order. Where
+    /// matches share a keypoint, only the one that agrees best is an inlier, with its copies.
     pub inliers: Vec<bool>,
     /// How many of them there are.
     pub inlier_count: usize,

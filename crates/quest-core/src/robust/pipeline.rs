@@ -89,7 +89,7 @@ impl Task<'_> {
         if one_each.is_none() {
             return conclude::conclude(&mut poses, &found, None, answer, options.max_false_alarms, &mut rng);
         }
-        // Of the matches of a keypoint the one that agrees best.
+        // One of the matches that share a keypoint is kept: the one that agrees best.
         let all = of(order.to_vec());
         let nearest = nearest(&all, &found.best.motion);
         let best_each = of(keypoints.one_each(order, |i| nearest[i]));

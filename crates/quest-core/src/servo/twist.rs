@@ -34,7 +34,7 @@ impl Twist {
     }
 }
 
-/// What a robot may be told at most.
+/// The largest velocities that a robot may be told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// In metres per second.

@@ -19,7 +19,7 @@ const ELSEWHERE: f64 = 0.5;
 /// The runner-up has at least this share of the inliers of the best, and the best of the runner-up's.
 const NEARLY_AS_WELL: f64 = 0.8;
 
-/// A pose replaces another of which it is not a refinement only if its cost is lower by this.
+/// A pose that is no refinement of another replaces it only if its cost is lower by this.
 const CLEARLY: f64 = 1e-4;
 
 /// Inliers that an alternative is first refined over, steps, and how far it looks in units of the threshold.
@@ -74,10 +74,10 @@ pub(crate) fn better_of(poses: &mut PoseScorer, polished: Polished, others: &[Al
 
 /// The two motions of a plane, that of the best pose first.
 ///
-/// The pose itself is one of the two only as far as the essential matrix determines it: a few false matches, each of
-/// which adds a line to what the plane leaves open, lead it far from both. Where the plane is exact its own motions are the
-/// answers, if there are more matches than any plane explains; where it is not, the pose and that motion of the plane from
-/// which it is further away. One that leaves many of the points behind a camera is no answer.
+/// The pose itself is one of the two only as far as the essential matrix determines it. A plane leaves the matrix partly open, and a
+/// few false matches close that gap and lead the pose far from both. Where the plane is exact, and there are more matches than
+/// any plane explains, the plane's two motions are the answers. Where it is not, the answers are the pose and the motion of the
+/// plane that is further from it. A motion that leaves many of the points behind a camera is no answer.
 pub(crate) fn both_of_plane(
     poses: &mut PoseScorer,
     others: &[Alternative],
@@ -111,8 +111,8 @@ pub(crate) fn both_of_plane(
     }
 }
 
-/// Another motion that noise may have made the worse one: where the parallax is small the cost has a minimum on either side of
-/// the plane that the points are nearest to.
+/// Another motion, which only noise may have made the worse one. Where the parallax is small, the cost has a minimum on either side
+/// of the plane that the points are nearest to.
 pub(crate) fn as_likely(
     poses: &mut PoseScorer,
     others: &[Alternative],

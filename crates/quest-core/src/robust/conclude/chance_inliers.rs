@@ -1,9 +1,9 @@
 //! Matches that agree with a pose by chance.
 //!
-//! A false match that lies near its epipolar line by chance has no plausible depth: of a camera that hardly moves it is a point
-//! just before the lens. So far from the others, it has the longest lever on the pose as well, and turns it until it
-//! agrees; no loss sees it. So every inlier of an unusual depth is predicted by the others, and dropped where it is
-//! more likely false than true. The odds for it are
+//! A false match that lies near its epipolar line by chance has no plausible depth: where the camera hardly moves, it is a point
+//! just in front of the lens. So far from the others, it also has the longest lever on the pose and turns it until they agree, which
+//! no loss can see. So every inlier of an unusual depth is predicted from the others, and dropped where it is more likely false
+//! than true. The odds for it are
 //!
 //! ```text
 //! inliers / (outliers + 1) · A p(r, ρ),   p(r, ρ) = √(1 − h) / (√(2π) σ (1 + r² / ((1 − h) c²))²) · p(ρ) / (2 √w)
@@ -11,8 +11,8 @@
 //!
 //! `A` is the area over which the points of view 2, false ones too, are spread. `h` is the leverage `Jᵀ H⁻¹ J` of the match:
 //! a pose fitted without it has the residual `r / (1 − h)`, with the variance `σ² / (1 − h)`; `c` is the scale of the loss. `ρ` is
-//! the inverse depth, `w` its precision at unit noise; `2 √w dr dρ` is an element of the area. Of the inverse depths all
-//! that is known is where most of them are, `m ± γ`, and that few points are near ([`Usual`]).
+//! the inverse depth, `w` its precision at unit noise; `2 √w dr dρ` is an element of the area. All that is known of the
+//! inverse depths is where most of them are, `m ± γ`, and that few points are near ([`Usual`]).
 
 use std::f64::consts::PI;
 
@@ -40,7 +40,7 @@ const ENOUGH: usize = 20_000;
 pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: Polished) -> Polished {
     let observations = poses.observations;
     let mut motion = *polished.motion();
-    // Of few matches none can be spared.
+    // Where there are few matches none can be spared.
     if !(MANY..=ENOUGH).contains(&polished.pose.inliers.len()) {
         return polished;
     }

@@ -4,12 +4,11 @@
 //! last refinement's loss, the means being those of normal noise as large as the inliers show. For few inliers there is a factor
 //! close to one (P. J. Huber, *Robust statistics*, 1981, section 7.6).
 //!
-//! `∂r/∂t` is proportional to the inverse depth. Where a match has hardly moved, as near the epipole of a camera that goes
-//! forward, what was measured of that is noise, which adds to the square: one such match may outweigh all others. So `H` is the
-//! mean over what the inverse depths may be, given what was measured of them and of the others. The gradient `Σ ψ J`, though,
-//! scatters with the noise of `J` as well: `M` is the mean of `Σ J Jᵀ` over inverse depths that have their noise in addition. Where
-//! the parallax is well above the noise the two are one; where it is not, `H⁻¹` alone is too small by
-//! the square of the ratio of noise and parallax.
+//! `∂r/∂t` is proportional to the inverse depth. Where a match has hardly moved, as near the epipole of a camera that goes forward, its
+//! measured inverse depth is noise. The square of that noise adds up, and one such match may outweigh all others. So `H` is the mean
+//! over what the inverse depths may be, given their measurements and the others'. The gradient `Σ ψ J`, though, also scatters with
+//! the noise of `J`: `M` is the mean of `Σ J Jᵀ` over inverse depths with their noise added. Where the parallax is well above the
+//! noise, `H` and `M` are equal. Where it is not, `H⁻¹` alone is too small by the square of the ratio of noise and parallax.
 //!
 //! `S` is what false matches that happen to agree with the pose pull at it. As many as there are outliers are expected to have
 //! `S = Σ ψ² J Jᵀ / (1 + h)`, which is measured on false matches (see [`false_alarms`](crate::robust::conclude::false_alarms)). A match with the
@@ -33,7 +32,7 @@ use crate::robust::refine::epipolar::{One, Subset};
 use crate::robust::refine::loss::LEAST_SQUARES;
 use crate::robust::refine::point_transfer::rotation_hessian;
 
-/// Inliers, at most, that the normal equations are summed over.
+/// The most inliers that the normal equations are summed over.
 const ENOUGH: usize = 2_000;
 
 /// The variance of an inverse depth counts as at most this many times the median.
@@ -69,7 +68,7 @@ fn of_motion(
 
 /// The inverse of normal equations; `None` where a change of the motion moves no point by more than rounding does.
 ///
-/// That has to be asked of parameters in units of their own: directions count for little where the parallax is small.
+/// The question needs parameters in units of their own, because directions count for little where the parallax is small.
 fn inverse(hessian: &Matrix5<f64>) -> Option<Matrix5<f64>> {
     let scales = hessian.diagonal().map(|square| 1.0 / square.sqrt());
     let scaled = |matrix: &Matrix5<f64>| matrix.component_mul(&(scales * scales.transpose()));

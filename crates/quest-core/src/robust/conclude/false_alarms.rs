@@ -2,9 +2,9 @@
 //!
 //! How often a false match comes within a distance `r` of agreeing with a pose is measured on false matches: the points of view 1
 //! with those of view 2 shifted against them. That probability is `α(r) = r α(1)`, a band along a line, or what was measured at `r`
-//! where that is clearly more: of a threshold that spans the image, of points that are not spread over it. Of `n` matches the `k`
-//! nearest are within `r_k`; five of them any sample fits. So among `m` motions that were tried, the number of those that do as
-//! well by chance is at most
+//! where that is clearly more: with a threshold that spans the image, or with points that are not spread over it. The `k` nearest of
+//! `n` matches are within `r_k`, and any sample fits five of them. So among `m` motions that were tried, the number of those that do
+//! as well by chance is at most
 //!
 //! ```text
 //! NFA = min over k of (n − 5) m C(n − 5, k − 5) α(r_k)^(k − 5)
@@ -21,7 +21,7 @@ use crate::solver::shared::motion::Motion;
 /// False matches that are looked at.
 const FALSE_MATCHES: usize = 1_000;
 
-/// False matches are counted up to this multiple of the threshold: there are more of them.
+/// False matches are counted up to this multiple of the threshold, where there are more of them to count.
 const WIDE: f64 = 3.0;
 
 /// Real solutions of a sample, on average.

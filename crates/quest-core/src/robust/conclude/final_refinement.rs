@@ -9,11 +9,11 @@ use crate::solver::shared::motion::Motion;
 /// Steps of each refinement.
 const STEPS: usize = 15;
 
-/// Inliers, at most, that the first of them looks at: it is where the second begins.
+/// The most inliers that the first refinement looks at: it is only where the second begins.
 const ENOUGH: usize = 5_000;
 
-/// The scale of the last loss, in standard deviations of the noise: normal noise loses 7 % of its worth, and 1 %
-/// where it is recognised.
+/// The scale of the last loss, in standard deviations of the noise. Normal noise loses 7 % of its worth with the first, and 1 %
+/// with the second, which is taken where the noise is recognised as normal.
 const WIDTH: f64 = 2.8;
 const WIDTH_OF_NORMAL: f64 = 5.0;
 

@@ -11,7 +11,7 @@ use crate::solver::shared::motion::Motion;
 /// them, as for a median deviation, may be one wall.
 const MOST: usize = 90;
 
-/// So many standard deviations are `γ`, if they are normal.
+/// The standard deviations in `γ` where the inverse depths are normal: 90 % of a normal variable lie within 1.645 of them.
 const DEVIATIONS: f64 = 1.645;
 
 /// The least square of the sine between a ray and the translation: at the epipole itself there is no depth.
@@ -64,7 +64,7 @@ impl InverseDepth {
         [one, two]
     }
 
-    /// Of all of these matches.
+    /// The inverse depths of all of these matches.
     pub(crate) fn all(columns: &Columns, motion: &Motion, indices: &[u32]) -> Vec<Self> {
         indices.iter().map(|&i| Self::new(columns, motion, i as usize)).collect()
     }
@@ -104,7 +104,7 @@ pub(crate) struct Usual {
 }
 
 impl Usual {
-    /// Of one depth at least.
+    /// What is known of at least one depth.
     pub(crate) fn new(depths: &[InverseDepth]) -> Self {
         let quantile = |mut values: Vec<f64>, percent: usize| {
             let index = (values.len() - 1) * percent / 100;

@@ -1,11 +1,11 @@
 //! The length of the translation in the scale of [`conventions`](crate::conventions): the mean absolute depth is one.
 //!
-//! Where every depth stands clear of its noise that is what is computed. Where some do not, inverse depths are the
-//! quantity whose noise is symmetric, and their median, signs included, goes to zero with the parallax. Weighted means would be
-//! ruled by a few chance inliers.
+//! Where every depth stands clear of its noise, that mean is computed. Where some depths do not, the median of the inverse depths is
+//! taken, signs included: their noise is symmetric, and the median goes to zero with the parallax. Weighted means would be ruled by a
+//! few chance inliers.
 //!
-//! The noise of depths, given the motion, averages out soon. What is left of the variance is which points the mean is over: true
-//! matches beyond the threshold are not among the inliers, and false ones are, with any depth.
+//! The noise of depths, given the motion, averages out soon. The rest of the variance comes from which points the mean is over: true
+//! matches beyond the threshold are missing, and false matches with any depth are among the inliers.
 
 use nalgebra::{Vector3, Vector5};
 
@@ -14,10 +14,10 @@ use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
 use crate::solver::shared::motion::Motion;
 
-/// A depth is clear of its noise at so many standard deviations.
+/// A depth stands clear of its noise at this many standard deviations.
 const CLEAR: f64 = 3.0;
 
-/// The share of depths that have to be.
+/// The share of depths that must stand clear.
 const MOST: f64 = 0.9;
 
 /// More matches than this are not looked at.
@@ -51,7 +51,7 @@ struct BothDepths {
 }
 
 impl BothDepths {
-    /// Of a match whose vectors have these lengths where they were given: depths are multiples of them.
+    /// The depths of a match whose vectors were given with these lengths: depths are multiples of them.
     fn new(columns: &Columns, index: usize, lengths: Option<[f64; 2]>, motion: &Motion, sigma: f64) -> Self {
         let depth = InverseDepth::new(columns, motion, index);
         let scales =
@@ -113,7 +113,7 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
     by_depths(&clear, &chance)
 }
 
-/// What share of a normal variable is beyond so many standard deviations, by the bound of Mills' ratio.
+/// The share of a normal variable beyond this many standard deviations, by the bound of Mills' ratio.
 fn beyond(deviations: f64) -> f64 {
     let bound = std::f64::consts::FRAC_2_PI.sqrt() * (-0.5 * deviations * deviations).exp() / deviations;
     bound.min(1.0)

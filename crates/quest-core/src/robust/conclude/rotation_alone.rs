@@ -8,7 +8,7 @@ use crate::robust::data::point_transfer::Framed;
 use crate::robust::refine::loss::{CAP, GemanMcClure, SCALE};
 use crate::robust::refine::point_transfer::refine_rotation;
 
-/// A rotation that leaves more than this is not enough whatever the evidence.
+/// A rotation that leaves more than this is not enough, whatever the evidence says.
 pub(crate) const NOT_A_ROTATION: f64 = 5.0;
 
 /// A rotation whose mean capped error over some of the matches is above this is not refined over all of them: it is not enough.

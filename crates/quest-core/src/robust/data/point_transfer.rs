@@ -98,7 +98,7 @@ impl Framed {
 }
 
 impl Block {
-    /// Of at most [`WIDTH`] matches, and at least one.
+    /// A block of one to [`WIDTH`] matches.
     fn new(some: &[FramedMatch]) -> Self {
         let each: [&FramedMatch; WIDTH] = std::array::from_fn(|j| &some[j.min(some.len() - 1)]);
         Self {

@@ -249,7 +249,7 @@ const SCHEDULE: Schedule = Schedule {
     singular: Singular::IsDamped,
 };
 
-/// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, with at most so many steps.
+/// Brings a motion to a local minimum of the summed loss over the subset, as near as `until` says, by at most `max_steps` steps.
 pub(crate) fn refine(
     subset: &Subset,
     motion: &mut Motion,

@@ -172,7 +172,7 @@ where
     }
 }
 
-/// Descends by at most so many steps. The cost before the last of them.
+/// Descends by at most `max_steps` steps. Returns the cost before the last of them.
 fn minimise<const P: usize, M>(
     model: &mut M,
     count: usize,

@@ -1,21 +1,21 @@
 //! Where samples come from, and when there are enough of them.
 //!
 //! One sample in four is drawn from all matches. The others come from pools: the first matches of their own order of coherence
-//! ([`ranking`](super::ranking)), of the order of the scores that were given, of both together. There is no schedule by which a pool
-//! grows: of every sample it is known which pool it came from, and so what chance it had. The search is over when
+//! ([`ranking`](super::ranking)), of the order of the scores that were given, of both together. No schedule lets a pool grow:
+//! the guide knows which pool each sample came from, and so what chance it had. The search is over when
 //!
 //! 1. *the best pose would have been found again*: `Σ −ln(1 − u q) ≥ −ln(1 − confidence)` over all samples, with `q` the chance
 //!    that a sample of its pool consists of inliers of the best pose and `u` the share of those that lead to it
 //!    ([`useful`](super::useful));
 //! 2. *no competitor is left*: another pose with as many inliers would have been found too. Coherence finds what is
 //!    coherent first, be it a moving object, a second plane or a repeated texture with fewer matches than the truth. So the matches
-//!    that the best pose leaves are ranked anew and samples are drawn from their pools, as if a share of [`APART`] of the
-//!    competitor's inliers were among them, as much denser at the head of the order as those of the best pose are, but at most
-//!    [`MOST_DENSE`], and useful as seldom as an unknown pose may be;
+//!    that the best pose leaves are ranked again, and samples are drawn from their pools. Three assumptions say how many: a share of
+//!    [`APART`] of the competitor's inliers is among these matches; they are as much denser at the head of the order as those of the
+//!    best pose, but at most [`MOST_DENSE`]; clean samples are as seldom useful as those of an unknown pose may be;
 //! 3. *it is not chance*, which the search asks before it stops.
 //!
-//! Where the order is of no use, no pool is denser than all matches are, the rules are those of uniform samples, and a quarter of
-//! the samples more are drawn than those would take, at worst.
+//! Where the order is of no use, no pool is denser than all matches are. The rules are then those of uniform samples, and at worst a
+//! quarter more samples are drawn than those would take.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -26,14 +26,13 @@ use crate::robust::search::sampling::{Sample, draw_from, draw_uniform};
 use crate::robust::search::stopping::{self, chance, gain};
 use crate::robust::search::useful::{USEFUL, Useful};
 
-/// One in so many samples is drawn from all matches. Of four and eight the second is a tenth faster and no less safe; of two, a
-/// fifth slower.
+/// One sample in this many is drawn from all matches. Eight would be a tenth faster and as safe, two would be a fifth slower.
 const UNIFORM: usize = 4;
 
 /// A competitor has at least this share of its inliers among the matches that the best pose leaves.
 const APART: f64 = 0.8;
 
-/// A competitor is at most so dense in a pool. At 0.9 a dense false motion won in 7 to 20 % of the scenes with one, at 0.6
+/// The largest density of a competitor in a pool. At 0.9 a dense false motion won in 7 to 20 % of the scenes that have one, at 0.6
 /// and below in none.
 const MOST_DENSE: f64 = 0.6;
 
@@ -46,7 +45,7 @@ pub(crate) struct Guide {
     sample: usize,
     /// `−ln(1 − confidence)`.
     enough: f64,
-    /// Matches from the best to the worst as scores say that were given.
+    /// The matches from the best to the worst by the scores that were given.
     given: Option<Vec<u32>>,
     chart: Option<Chart>,
     /// Pools of all matches, once they are ranked.
@@ -64,7 +63,7 @@ pub(crate) struct Guide {
 struct Best {
     is_inlier: Vec<bool>,
     inliers: usize,
-    /// Of samples from all matches, and from pools, whose matches are nearer to each other.
+    /// One for samples from all matches, one for samples from pools, whose matches are nearer to each other.
     useful: [Useful; 2],
     /// What a sample of all matches adds for it, and for a competitor.
     gain: f64,

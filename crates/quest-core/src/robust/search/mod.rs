@@ -1,10 +1,9 @@
 //! The search: samples, hypotheses, scores, local optimisation, until enough samples have been drawn.
 //!
-//! A random sample without outliers still has the noise of five matches. So hypotheses that beat the earlier ones, of each
-//! block of samples the best, are refined over their inliers (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM
-//! 2003); what they have to beat is the best hypothesis as it was before its refinement, which leaves more starts for
-//! refinement than the refined one would. To refine every one that is better than those before it in its block finds
-//! poses no better.
+//! A random sample without outliers still has the noise of five matches. So the best hypothesis of each block of samples is
+//! refined over its inliers if it beats the earlier ones (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM 2003).
+//! It has to beat the best hypothesis as that was before its refinement: this leaves more starts for refinement than the refined one
+//! would. Refining every hypothesis that is better than those before it in its block finds no better poses.
 
 mod chart;
 mod guide;
@@ -39,13 +38,13 @@ use crate::solver::shared::motion::Motion;
 const FIRST_BLOCK: usize = 8;
 const BLOCK: usize = 32;
 
-/// So many samples are drawn before the matches are ranked, and only where more are needed than ranking takes the time of: a match
-/// is ranked in about a seventh of the time of a sample.
+/// Samples that are drawn before the matches are ranked. They are ranked only where ranking takes less time than the samples that
+/// are still needed: a match is ranked in about a seventh of the time of a sample.
 const UNRANKED: usize = 40;
 const RANKED_PER_SAMPLE: usize = 7;
 
-/// The stopping rule counts matches up to this multiple of the threshold: counted at the threshold itself a pose that is
-/// not refined to the end looks worse than it is, and the search goes on for nothing.
+/// The stopping rule counts matches up to this multiple of the threshold. At the threshold itself, a pose that is not refined to the
+/// end would look worse than it is, and the search would go on for nothing.
 const SUPPORT: f64 = 1.5;
 
 /// A sample has led to the best pose if one of its hypotheses explains this share of what the pose explains. Not sensitive
@@ -106,7 +105,7 @@ pub(crate) struct Draws {
     pub(crate) given: Option<Vec<u32>>,
 }
 
-/// Whether chance explains a pose, its inliers those within the threshold, that was found among so many samples.
+/// Whether chance explains a pose with its inliers within the threshold that was found among this many samples.
 pub(crate) type IsChance<'a> = dyn FnMut(&ScoredPose, usize) -> bool + 'a;
 
 /// Samples that are solved together.
@@ -145,7 +144,7 @@ pub(crate) struct Search<'a> {
     /// Samples drawn, and as how many uniform ones they count where chance is judged.
     iterations: usize,
     tries: usize,
-    /// How many poses have been the best, which of them the guide knows, and whether chance explains that one, once it was asked.
+    /// How many poses have been the best; which of them the guide knows; whether chance explains that one, once this was asked.
     bests: usize,
     guided: usize,
     is_chance: Option<bool>,
@@ -174,9 +173,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Draws samples until the limits say that it is enough: of few matches all that there are, of others as the guide says.
-    /// `given` are the matches from the best to the worst, where that is known; `is_chance` says of a motion whether as many
-    /// samples as were drawn would find one as good among false matches.
+    /// Draws samples until the limits say that they are enough: all that there are of few matches, else as many as the guide says.
+    /// `given` are the matches from the best to the worst, where that is known. `is_chance` says whether as many samples as were
+    /// drawn would find a motion as good among false matches.
     pub(crate) fn run(
         &mut self,
         source: &mut dyn HypothesisSource,
@@ -219,7 +218,7 @@ impl<'a> Search<'a> {
         (poses, best.map(|best| SearchResult { best, of_few: all, iterations, tries }))
     }
 
-    /// Looks at every sample: where there are few matches that costs little.
+    /// Looks at every sample, which costs little where there are few matches.
     fn run_all(&mut self, source: &mut dyn HypothesisSource, mut samples: Exhaustive, limits: &Limits) {
         let mut round = Round::default();
         while self.iterations < limits.max_iterations && !(limits.is_cancelled)() {
@@ -312,7 +311,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Of few matches every hypothesis is refined and kept: the scores hardly tell them apart.
+    /// With few matches the scores hardly differ, so every hypothesis is refined and kept.
     fn consider_one_of_few(&mut self, e: &Matrix3<f64>) {
         let pose = self.poses.best_pose(e, self.width());
         let Some(pose) = pose.filter(|pose| self.allows(&pose.scored)) else { return };

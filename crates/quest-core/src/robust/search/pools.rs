@@ -5,16 +5,16 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::robust::search::stopping::{chance, gain};
 
-/// A pool holds at least so many matches: five of fewer lie too close together. Not sensitive between 12 and 40.
+/// A pool holds at least this many matches: five out of fewer lie too close together. Not sensitive between 12 and 40.
 pub(crate) const LEAST: usize = 20;
 
 /// The smallest pool is this part of all matches, in powers of two.
 const SMALLEST: u32 = 7;
 
-/// So many inliers of a pool are not counted: any sample fits five.
+/// The inliers of a pool that are not counted: any sample fits five.
 const FREE: f64 = 5.0;
 
-/// Orders of some matches, of which the first `n` are a pool, for several `n`. The last pool of each order is everything.
+/// Orders of some matches. The first `n` of an order are a pool, for several `n`; its last pool is everything.
 #[derive(Debug)]
 pub(crate) struct Pools {
     orders: Vec<Vec<u32>>,

@@ -8,8 +8,8 @@
 //! Λ = A V / (π (V + |d2 − z d1|²)²),    V = σ² |d1||d2| + ν²
 //! ```
 //!
-//! and a match is worth `Σ log2(1 + ω Λ)` over its neighbours, with `ω` the share of true matches. A pair counts the more the
-//! shorter it is, so that no number of neighbours and no distance has to be chosen: far ones count next to nothing.
+//! and a match is worth `Σ log2(1 + ω Λ)` over its neighbours, with `ω` the share of true matches. A shorter pair counts for more,
+//! so neither a number of neighbours nor a distance has to be chosen: far neighbours count next to nothing.
 //!
 //! # Neighbours
 //! The matches stand on a snake through strips of view 1, once along `x` and once along `y`; neighbours are those that follow
@@ -142,7 +142,7 @@ fn compared([[p, q], [r, s]]: [[f32; 2]; 2]) -> [f32; 4] {
     [p * p + q * q, r * r + s * s, p * r + q * s, p * s - q * r]
 }
 
-/// Finds by what all differences are turned, each counted by the probability that its pair is true.
+/// Finds the turn that all differences have in common. Each counts by the probability that its pair is true.
 struct Turn<'a> {
     along: &'a Chart,
     area: f32,
@@ -163,7 +163,7 @@ impl Work for Turn<'_> {
                 let d = differences([x1[i], y1[i], x2[i], y2[i]], [u1[i], v1[i], u2[i], v2[i]]);
                 let [d1, d2, dot, across] = compared(d);
                 let length = (d1 * d2).sqrt();
-                // Of any turn: over the lengths alone the densest that V allows.
+                // A neighbour at any turn: the densest that V allows over the lengths alone.
                 let odds = SHARE * self.area / (12.0 * (length + SQUARE_NOISE));
                 let is_like = (d1 < 9.0 * d2) & (d2 < 9.0 * d1) & (d1 + d2 > SAME);
                 let weight = if is_like { odds / ((1.0 + odds) * (length + 1.0)) } else { 0.0 };

@@ -1,10 +1,10 @@
 //! What share of the samples without outliers leads to a pose: noise makes the others useless.
 
-/// Nothing being known, and for poses that were not found: of points all about, seen with much parallax, nine in ten samples
-/// lead to the pose; this is for little parallax and points near a plane.
+/// The share that is assumed while nothing is known, and for poses that were not found. It is that of little parallax and points near
+/// a plane; with points all about and much parallax nine in ten samples lead to the pose.
 pub(crate) const USEFUL: f64 = 1.0 / 6.0;
 
-/// As many samples as the share that is assumed counts for.
+/// The assumed share counts as this many samples.
 const WEIGHT: f64 = 6.0;
 
 /// The share is never taken to be less than this part of [`USEFUL`]: it is what the search would wait for.

@@ -11,7 +11,7 @@ pub struct JointLimits<'a> {
     pub speeds: &'a [f64],
     /// Where each joint is and between which ends it may be; empty for joints without ends.
     pub positions: &'a [JointPosition],
-    /// A joint may come no closer to its end than it would in so many seconds.
+    /// A joint may not come closer to its end than it would in this many seconds.
     pub seconds: f64,
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Memory {
     pub(crate) holding_images: usize,
     pub(crate) holding_seconds: f64,
     pub(crate) arrived: bool,
-    /// For so long the camera has been at the goal.
+    /// How long the camera has been at the goal.
     at_goal_seconds: f64,
     pub(crate) watchdog: Watchdog,
     pub(crate) exploration: Exploration,
@@ -56,7 +56,7 @@ impl Memory {
         Some(seconds)
     }
 
-    /// How the camera should have moved by the last command in so many seconds.
+    /// How the camera should have moved by the last command in this many seconds.
     pub(crate) fn motion(&self, seconds: f64, unit: f64) -> Motion {
         Motion {
             linear: self.camera_command.linear * (seconds / unit),
@@ -129,7 +129,7 @@ impl Memory {
 pub(crate) struct Exploration {
     /// How many there have been.
     pub(crate) tries: usize,
-    /// For so many images the camera has stood still, its rotation done.
+    /// The number of images for which the camera has stood still, its rotation done.
     still: usize,
     /// How far this one has gone, in metres.
     travelled: f64,
@@ -137,7 +137,7 @@ pub(crate) struct Exploration {
 }
 
 impl Exploration {
-    /// The rotation is done to so many radians, for so many images, before the camera is moved.
+    /// Before the camera is moved, its rotation must be within `DONE` radians for `STILL_IMAGES` images.
     const DONE: f64 = 0.02;
     const STILL_IMAGES: usize = 8;
     const MOST_TRIES: usize = 3;

@@ -15,14 +15,14 @@ use rig::{Mount, Rig};
 use safety::Safety;
 use state::{State, Status, Step};
 
-/// How slowly the best of several hypotheses is followed that command different things: slow enough that a wrong one is found out
-/// before it has gone far.
+/// The share of its speed with which the best of several hypotheses is followed while they command different things: slow enough that
+/// a wrong one is found out before it has gone far.
 const AMBIGUOUS_SPEED: f64 = 0.4;
 
 /// How slowly a pose is followed until the camera is seen to go where it is sent: a second at 10 Hz, and a few centimetres.
 const CONFIRMING_SPEED: f64 = 0.3;
 
-/// After so many divergences the loop holds until it is reset: each took the camera a little further from its goal.
+/// The number of divergences after which the loop holds until it is reset: each took the camera a little further from its goal.
 const MOST_DIVERGENCES: usize = 3;
 
 /// A closed loop's controller: an image in, a command out.

@@ -19,7 +19,7 @@ pub enum Mount {
 }
 
 impl Mount {
-    /// A camera so far ahead of the axle and above it, in metres, looking down by `tilt` radians.
+    /// A camera at these distances ahead of the axle and above it, in metres, that looks down by `tilt` radians.
     #[must_use]
     pub fn ahead(forward: f64, height: f64, tilt: f64) -> Self {
         // Looking down turns the optical axis, z, towards y of the base: a rotation about x by −tilt.

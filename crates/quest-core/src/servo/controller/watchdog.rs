@@ -7,7 +7,7 @@
 
 use crate::servo::estimators::estimate::Motion;
 
-/// Judged after so many images at the earliest,
+/// It judges after this many images at the earliest,
 const IMAGES: usize = 15;
 /// and after a commanded way of this share of √V: a right pose then leaves half of V. A unit guessed wrong by five still passes.
 const SHARE: f64 = 0.3;

@@ -37,7 +37,7 @@ pub struct Estimate {
     pub covariance: Option<Matrix6<f64>>,
     /// How many features it rests on.
     pub inliers: usize,
-    /// Root mean square of their reprojection errors, on the plane z = 1; NaN never.
+    /// Root mean square of their reprojection errors, on the plane z = 1; never NaN.
     pub residual: f64,
     /// How many answers fit about as well: 1 where the pose is settled.
     pub alternatives: usize,

@@ -78,7 +78,7 @@ impl World {
         Border::of_camera(&self.camera, margin)
     }
 
-    /// Whether all features are at least so many pixels inside of the image.
+    /// Whether all features are at least `border` pixels inside of the image.
     #[must_use]
     pub fn sees_all(&self, pose: &RelativePose, margin: f64) -> bool {
         let imaging = self.imaging();
@@ -91,7 +91,7 @@ impl World {
         self.imaging().project(pose).flatten().count()
     }
 
-    /// Whether a law that is told the true pose, with `unit` metres for one, keeps all features in view for so many images.
+    /// Whether a law that is told the true pose, with `unit` metres for one, keeps all features in view for `images` images.
     #[must_use]
     pub fn stays_in_view(
         &self,
@@ -109,7 +109,7 @@ impl World {
         })
     }
 
-    /// Runs the loop for so many images; `watch` sees each and may end the run by returning `false`.
+    /// Runs the loop for `images` images; `watch` sees each and may end the run by returning `false`.
     pub fn run<E: PoseEstimator, L: ControlLaw>(
         &self,
         plant: &mut impl Plant,

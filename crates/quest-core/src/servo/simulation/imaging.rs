@@ -32,7 +32,7 @@ pub struct Disturbances {
 pub struct Sticky {
     /// The share of features that are matched with another one.
     pub share: f64,
-    /// For so many images in the mean; infinite for ever.
+    /// Its mean duration in images; infinite for ever.
     pub images: f64,
 }
 

@@ -56,7 +56,7 @@ fn mean_rotation(w: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// A robot on the plane `y = 0` with two driven wheels, the camera on its axle, looking ahead: equation (C.3),
-/// `ż = ν cos θ`, `ẋ = ν sin θ`, `θ̇ = ω`. Of a twist it takes the speed `linear.z` and the turn rate `angular.y`.
+/// `ż = ν cos θ`, `ẋ = ν sin θ`, `θ̇ = ω`. It takes the speed `linear.z` and the turn rate `angular.y` of a twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DifferentialDrive {
     /// To the right of the goal, in metres.
