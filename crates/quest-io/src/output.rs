@@ -132,10 +132,24 @@ impl Target {
             return Err(io::ErrorKind::PermissionDenied.into());
         }
         // A link stays a link: the file it leads to is the one that is replaced.
-        let path = if existing.is_some() { fs::canonicalize(path)? } else { path.to_owned() };
+        let path = if existing.is_some() { fs::canonicalize(path)? } else { led_to(path)? };
         tempfile::tempfile_in(directory(&path))?;
         Ok(Self::File { path, text: Vec::new() })
     }
+}
+
+/// Where a file is that is not there yet: where a link leads to, if it is one.
+fn led_to(path: &Path) -> io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const LINKS: usize = 40;
+    let mut path = path.to_owned();
+    for _ in 0..LINKS {
+        match fs::read_link(&path) {
+            Ok(target) => path = directory(&path).join(target),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(io::Error::other("found a link that leads back to itself, expected a file"))
 }
 
 fn directory(path: &Path) -> &Path {

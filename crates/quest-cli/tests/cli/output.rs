@@ -91,6 +91,19 @@ mod unix {
     }
 
     #[test]
+    fn a_link_that_leads_to_no_file_yet_stays_a_link() {
+        let directory = tempfile::tempdir().unwrap();
+        let (real, link) = (directory.path().join("real.json"), directory.path().join("link.json"));
+        symlink("real.json", &link).unwrap();
+        assert_eq!(run_in(directory.path(), &["solvers", "--no-times", "-o", "link.json"], b"").status, 0);
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert!(fs::read_to_string(&real).unwrap().starts_with("[{"));
+        symlink("round.json", directory.path().join("round.json")).unwrap();
+        let run = run_in(directory.path(), &["solvers", "--no-times", "-o", "round.json"], b"");
+        assert!(run.status == 2 && run.stderr.contains("leads back to itself"), "{}", run.stderr);
+    }
+
+    #[test]
     fn a_new_file_is_not_private() {
         let directory = tempfile::tempdir().unwrap();
         assert_eq!(run_in(directory.path(), &["solvers", "--no-times", "-o", "new.json"], b"").status, 0);

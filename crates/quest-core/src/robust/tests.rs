@@ -133,6 +133,14 @@ fn a_camera_that_turns_in_place_has_a_rotation_and_no_translation() {
 }
 
 #[test]
+fn as_many_iterations_as_there_can_be() {
+    let (scene, _) = scene(&noisy(100), 0.3, 70);
+    let most = Options { max_iterations: usize::MAX, ..options() };
+    let found = estimate(&scene.matches, &most).unwrap();
+    assert_eq!(found, estimate(&scene.matches, &options()).unwrap());
+}
+
+#[test]
 fn an_exact_rotation_needs_no_translation() {
     let turning = SceneOptions { motion: SceneMotion::PureRotation, points: 60, ..SceneOptions::realistic() };
     let (scene, _) = scene(&turning, 0.3, 55);

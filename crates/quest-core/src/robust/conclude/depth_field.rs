@@ -39,6 +39,11 @@ const FARTHEST: f64 = 1.8;
 /// The least spread of the inverse depths, squared.
 const LEAST_SPREAD: f64 = 1e-8;
 
+/// The square of the spread changes in a round by what EM says to this power, which goes nearly twice as fast to the same limit, and by
+/// not more than this before.
+const RELAXED: f64 = 1.8;
+const MOST_CHANGE: f64 = 3.0;
+
 /// Displacements by a unit of inverse depth below this, in pixels, have no direction.
 const LEAST_LENGTH: f64 = 1e-9;
 
@@ -47,9 +52,9 @@ const NEAR: f64 = 0.02;
 const LEAST_NEAR: f64 = 1e-6;
 const MOST_NEAR: f64 = 0.9;
 
-/// So many near points are there by chance: the direction of the translation is free to fit two false matches, and of thirty false
-/// ones some third agrees with some two.
-const FREE: f64 = 3.0;
+/// So many near points are there by chance: the direction of the translation is free to fit two false matches, and among thirty false
+/// ones there are a third and a fourth that agree with some two.
+const FREE: f64 = 4.0;
 
 /// Normal equations have at least this share of their diagonal added: without a translation the field moves no point.
 const RIDGE: f64 = 1e-9;
@@ -188,7 +193,9 @@ impl DepthField {
             self.t_21 += step.fixed_rows::<3>(3);
             self.field += step.fixed_rows::<TERMS>(6);
             if sums.usual > 0.0 {
-                self.square_spread = (sums.square_spread / sums.usual).max(LEAST_SPREAD);
+                let ratio = sums.square_spread / sums.usual / self.square_spread;
+                let ratio = ratio.clamp(1.0 / MOST_CHANGE, MOST_CHANGE).powf(RELAXED);
+                self.square_spread = (self.square_spread * ratio).max(LEAST_SPREAD);
                 let near = (sums.near - FREE).max(0.0);
                 self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
             }

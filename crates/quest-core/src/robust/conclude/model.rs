@@ -29,9 +29,9 @@ use crate::robust::search::search_score::MANY;
 /// With few matches a rotation alone is enough below this.
 const ROTATION: f64 = 3.0;
 
-/// A rotation alone is enough while the evidence against it is below this, in nats: of 600 rotations in place none came to 9, and
-/// that one with 30 matches.
-const EVIDENT: f64 = 12.0;
+/// A rotation alone is enough while the evidence against it is below this, in nats. With 12, 98.3 % of 600 rotations in place of 100 and of
+/// 500 matches are named.
+const EVIDENT: f64 = 13.0;
 
 /// A plane has to explain all but this share of what a rotation leaves: where that is little, any plane leaves little.
 const UNEXPLAINED: f64 = 0.1;

@@ -15,8 +15,9 @@ use crate::robust::search::pose_score::PoseScorer;
 use crate::robust::search::search_score::MANY;
 use crate::solver::shared::motion::Motion;
 
-/// The motion is small where a rotation leaves less than this (the `F` of [`model`](crate::robust::conclude::model)).
-const SMALL: f64 = 7.0;
+/// The motion is small where a rotation leaves less than this (the `F` of [`model`](crate::robust::conclude::model), of which the
+/// most is 8.2).
+const SMALL: f64 = 7.5;
 
 /// The calibration error of a good camera, in radians: noise below that tells nothing of the model.
 const CALIBRATION: f64 = 1e-4;

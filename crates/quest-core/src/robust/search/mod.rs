@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
         let mut enough = self.enough(&mut guide, limits, is_chance);
         let mut block = FIRST_BLOCK;
         while self.iterations < enough && !(limits.is_cancelled)() {
-            let wanted = (enough - self.iterations).next_multiple_of(LANES).min(block);
+            let wanted = (enough - self.iterations).min(block).next_multiple_of(LANES);
             round.draw(&mut guide, wanted.min(limits.max_iterations - self.iterations));
             self.look_at(source, &mut round);
             self.learn(&mut guide, &round, draws.size);
