@@ -31,6 +31,8 @@ const MEDIAN_VARIANCE: f64 = std::f64::consts::FRAC_PI_2;
 pub(crate) struct Length {
     pub(crate) value: f64,
     pub(crate) variance: f64,
+    /// Whether it is by depths that are clear of their noise.
+    pub(crate) is_clear: bool,
     by_rotation: Vector3<f64>,
     by_direction: Vector3<f64>,
 }
@@ -88,7 +90,7 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
     let some = &inliers[..inliers.len().min(ENOUGH)];
     if some.is_empty() {
         let zero = Vector3::zeros();
-        return Length { value: 0.0, variance: 0.0, by_rotation: zero, by_direction: zero };
+        return Length { value: 0.0, variance: 0.0, is_clear: false, by_rotation: zero, by_direction: zero };
     }
     let of_inlier = |&index: &u32| {
         let m = &observations.matches[index as usize];
@@ -153,6 +155,7 @@ fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
     Length {
         value,
         variance: (of_noise + of_missed + of_false) * (value / count).powi(2),
+        is_clear: true,
         by_rotation: by_rotation * by_mean,
         by_direction: by_direction * by_mean,
     }
@@ -168,6 +171,7 @@ fn by_inverse_depths(all: &[BothDepths]) -> Length {
     Length {
         value: 0.5 * (median(&mut first) + median(&mut second)),
         variance: MEDIAN_VARIANCE * variance / (count * count),
+        is_clear: false,
         by_rotation: all().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() / (2.0 * count),
         by_direction: all().map(|rho| rho.by_direction).sum::<Vector3<f64>>() / (2.0 * count),
     }

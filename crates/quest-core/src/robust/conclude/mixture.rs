@@ -101,6 +101,17 @@ pub(crate) fn held(q_21: &UnitQuaternion<f64>, (pose, covariance): Distribution)
     (RelativePose::new(*q_21, pose.t_21 - step), covariance + by * by.transpose())
 }
 
+/// The same with a translation of this length: that of the mean depth, of which the unit of a field is an approximation.
+pub(crate) fn of_length((pose, covariance): Distribution, length: f64) -> Distribution {
+    let scale = length / pose.t_21.norm();
+    if !(scale > 0.0 && scale.is_finite()) {
+        return (pose, covariance);
+    }
+    let units = Vector6::new(1.0, 1.0, 1.0, scale, scale, scale);
+    let scaled = covariance.component_mul(&(units * units.transpose()));
+    (RelativePose::new(pose.q_21, pose.t_21 * scale), scaled)
+}
+
 /// The mean and the covariance of a mixture.
 fn merged(q_21: &UnitQuaternion<f64>, all: &[Component]) -> Distribution {
     let most = all.iter().map(|c| c.nats).fold(f64::NEG_INFINITY, f64::max);

@@ -9,7 +9,7 @@ use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plan
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
-use crate::robust::conclude::mixture::{held, mixture};
+use crate::robust::conclude::mixture::{Distribution, held, mixture, of_length};
 use crate::robust::conclude::model::Verdict;
 use crate::robust::conclude::plane::Plane;
 use crate::robust::conclude::small_motion::SmallMotion;
@@ -85,6 +85,7 @@ pub(crate) fn report(
         let general = general.map(|covariance| (pose, covariance));
         mixture(observations, small, sigma, general.as_ref())
             .map(|all| if model == Model::PureRotation { held(&small.q_21, all) } else { all })
+            .map(|all| in_mean_depths(observations, all, inliers, &noise))
             .filter(|(_, covariance)| covariance::says_something(covariance))?
     } else if model == Model::PureRotation {
         (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
@@ -125,6 +126,18 @@ fn chosen(answer: Answer, (motion, second): (Motion, Option<Motion>)) -> (Motion
         (Answer::Given(given), _) => (given, Some(motion)),
         (_, second) => (motion, second),
     }
+}
+
+/// A pose whose translation is in units of the mean depth, where the depths of the inliers stand clear of their noise.
+fn in_mean_depths(
+    observations: &Observations,
+    all: Distribution,
+    inliers: &[u32],
+    noise: &Noise,
+) -> Distribution {
+    let Some(direction) = all.0.t_21.try_normalize(f64::MIN_POSITIVE) else { return all };
+    let size = length(observations, &Motion { q_21: all.0.q_21, direction }, inliers, noise);
+    if size.is_clear { of_length(all, size.value) } else { all }
 }
 
 /// The motion that the model makes of the pose, and another that explains the matches nearly as well.
