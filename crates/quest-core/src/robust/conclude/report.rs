@@ -83,10 +83,7 @@ pub(crate) fn report(
     let (pose, covariance) = if let Some(small) = &small {
         let general = covariance::of_pose(observations, &polished, size, false_matches);
         let general = general.map(|covariance| (pose, covariance));
-        mixture(observations, small, sigma, general.as_ref())
-            .map(|all| if model == Model::PureRotation { held(&small.q_21, all) } else { all })
-            .map(|all| in_mean_depths(observations, all, inliers, &noise))
-            .filter(|(_, covariance)| covariance::says_something(covariance))?
+        of_small_motion(observations, small, general.as_ref(), model, inliers, &noise)?
     } else if model == Model::PureRotation {
         (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
     } else {
@@ -128,16 +125,35 @@ fn chosen(answer: Answer, (motion, second): (Motion, Option<Motion>)) -> (Motion
     }
 }
 
-/// A pose whose translation is in units of the mean depth, where the depths of the inliers stand clear of their noise.
-fn in_mean_depths(
+/// The pose of a small motion and its covariance.
+fn of_small_motion(
     observations: &Observations,
-    all: Distribution,
+    small: &SmallMotion,
+    general: Option<&Distribution>,
+    model: Model,
     inliers: &[u32],
     noise: &Noise,
-) -> Distribution {
-    let Some(direction) = all.0.t_21.try_normalize(f64::MIN_POSITIVE) else { return all };
-    let size = length(observations, &Motion { q_21: all.0.q_21, direction }, inliers, noise);
-    if size.is_clear { of_length(all, size.value) } else { all }
+) -> Option<Distribution> {
+    let mut all = mixture(observations, small, noise.sigma, general)?;
+    if model == Model::PureRotation {
+        all = held(&small.q_21, all);
+    }
+    if let Some(length) = length_in_mean_depths(observations, &all.0, inliers, noise) {
+        all = of_length(all, length);
+    }
+    covariance::says_something(&all.1).then_some(all)
+}
+
+/// The length of a translation in units of the mean depth, where the depths of the inliers stand clear of their noise.
+fn length_in_mean_depths(
+    observations: &Observations,
+    pose: &RelativePose,
+    inliers: &[u32],
+    noise: &Noise,
+) -> Option<f64> {
+    let direction = pose.t_21.try_normalize(f64::MIN_POSITIVE)?;
+    let size = length(observations, &Motion { q_21: pose.q_21, direction }, inliers, noise);
+    size.is_clear.then_some(size.value)
 }
 
 /// The motion that the model makes of the pose, and another that explains the matches nearly as well.
