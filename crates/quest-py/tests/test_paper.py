@@ -37,9 +37,14 @@ def test_polynomials_of_the_papers_example_1() -> None:
 
 
 def test_polynomials_complex_and_none() -> None:
-    found = qp.solve_polynomials([{(2,): 1, (0,): 1}])
+    found = qp.solve_polynomials([{(2,): 1, (1,): 2, (0,): 2}])
     np.testing.assert_allclose(sorted(found.x[:, 0].imag.tolist()), [-1, 1], atol=1e-12)
+    np.testing.assert_allclose(found.x[:, 0].real, -1, atol=1e-12)
     assert found.real.shape == (0, 1)
+    # x and -x are one solution where all degrees are even.
+    found = qp.solve_polynomials([{(2,): 1, (0,): 1}])
+    np.testing.assert_allclose(np.abs(found.x), 1, atol=1e-12)
+    assert found.report["grading"] == 2
     none = qp.solve_polynomials([{(1,): 1}, {(1,): 1, (0,): -1}])
     assert none.x.shape == (0, 1)
     assert none.multiplicity.shape == (0,)
@@ -70,7 +75,7 @@ def _exponent(name: str, k: int) -> int:
     [
         ([], qp.QuestError, "no unknowns"),
         ([{}], qp.QuestError, "no unknowns"),
-        ([{(1, 0): 1}], qp.NoAnswer, "not overdetermined enough"),
+        ([{(2, 0): 1, (0, 1): 1}], qp.NoAnswer, "not overdetermined enough"),
         ([{(1, 0): 1}, {(1,): 1}], qp.QuestError, "1 exponents"),
         ([{(1,): float("nan")}], qp.QuestError, "finite"),
         ([[(1,)]], qp.QuestError, "equation 0 has the term"),

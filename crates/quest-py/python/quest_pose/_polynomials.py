@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from quest_pose._core import QuestError, _solve_polynomials
 
 _Exponents: TypeAlias = Sequence[int]
-Polynomial: TypeAlias = Mapping[tuple[int, ...], float] | Iterable[tuple[float, _Exponents]]
+# The keys are tuples of exponents; a mapping from pairs is none from tuples of any length to a type checker.
+Polynomial: TypeAlias = Mapping[Any, float] | Iterable[tuple[float, _Exponents]]
 
 
 class PolynomialSolutions(NamedTuple):
@@ -75,16 +76,21 @@ def solve_polynomials(
     QuestError
         For equations that are none: no terms, other numbers of exponents, a coefficient that is not finite.
 
+    Notes
+    -----
+    Where the degrees of all terms share a divisor, ``report["grading"]``, a solution times a root of one of that order is a
+    solution too. They count as one: with even degrees ``x`` and ``-x``.
+
     Examples
     --------
-    A circle and a hyperbola:
+    A circle and a hyperbola, which meet in two points and their negatives:
 
     >>> import quest_pose as qp
     >>> circle = {(2, 0): 1, (0, 2): 1, (0, 0): -4}
     >>> hyperbola = {(1, 1): 1, (0, 0): -1}
     >>> found = qp.solve_polynomials([circle, hyperbola])
-    >>> len(found.real), found.at_infinity
-    (4, 0)
+    >>> len(found.real), found.at_infinity, found.report["grading"]
+    (2, 0, 2)
     """
     rows = [_terms(number, equation) for number, equation in enumerate(equations)]
     unknowns = next((len(exponents) for row in rows for _, exponents in row), 0)
@@ -104,8 +110,9 @@ def solve_polynomials(
 
 def _terms(number: int, equation: Polynomial) -> list[tuple[float, list[int]]]:
     """The terms of an equation as coefficients and exponents."""
-    is_mapping = isinstance(equation, Mapping)
-    given: Any = ((c, e) for e, c in equation.items()) if is_mapping else equation
+    given: Iterable[Any] = equation
+    if isinstance(equation, Mapping):
+        given = [(c, e) for e, c in equation.items()]
     terms = []
     for term in given:
         try:
