@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
 use crate::robust::conclude::depth_field::Fit;
+use crate::robust::conclude::rotation_alone::NOT_A_ROTATION;
 use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::point_transfer::rotation_hessian;
@@ -64,7 +65,9 @@ pub(crate) fn mixture(
         let mean = after(&pose.q_21, pose.t_21);
         components.push(Component { nats: small.nats, mean, covariance: *covariance });
     }
-    if let Some(inverse) = rotation_hessian(&framed, &small.q_21).cholesky().map(|factor| factor.inverse()) {
+    let factor = rotation_hessian(&framed, &small.q_21).cholesky();
+    let is_possible = small.excess < NOT_A_ROTATION || components.is_empty();
+    if let Some(inverse) = factor.filter(|_| is_possible).map(|factor| factor.inverse()) {
         let square = observations.columns.focal_length().powi(2) * some.len() as f64;
         let mut covariance = Matrix6::zeros();
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&(inverse * (sigma * sigma)));

@@ -19,7 +19,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::plane::Plane;
-use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, rotation_alone};
+use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, median_root, rotation_alone};
 use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;
 use crate::robust::estimate::{Evidence, Model};
@@ -115,13 +115,4 @@ pub(crate) fn choose(
         general_px: median_root(general),
     };
     Verdict { model, evidence, q_21, is_exact_plane }
-}
-
-/// The root of the median, infinite of nothing.
-fn median_root(mut squares: Vec<f64>) -> f64 {
-    let middle = squares.len() / 2;
-    if squares.is_empty() {
-        return f64::INFINITY;
-    }
-    squares.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
 }

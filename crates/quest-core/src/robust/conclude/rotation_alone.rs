@@ -50,3 +50,12 @@ pub(crate) fn rotation_alone(
     }
     q
 }
+
+/// The root of the median, infinite of nothing.
+pub(crate) fn median_root(mut squares: Vec<f64>) -> f64 {
+    let middle = squares.len() / 2;
+    if squares.is_empty() {
+        return f64::INFINITY;
+    }
+    squares.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
+}

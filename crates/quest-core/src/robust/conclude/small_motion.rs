@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::robust::conclude::depth_field::{DepthField, Fit, Matches};
 use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
-use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, rotation_alone};
+use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, median_root, rotation_alone};
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::search::pose_score::PoseScorer;
@@ -18,6 +18,11 @@ use crate::solver::shared::motion::Motion;
 /// The motion is small where a rotation leaves less than this (the `F` of [`model`](crate::robust::conclude::model), of which the
 /// most is 8.2).
 const SMALL: f64 = 7.5;
+
+/// And where the median of what it leaves is less than this, in standard deviations: with heavy tails `F` is low at any parallax.
+/// Where a camera of which most points are at 10 px of parallax has 4, recorded pairs with the errors of real keypoints have
+/// other depths than a smooth field.
+const FAR: f64 = 6.0;
 
 /// The calibration error of a good camera, in radians: noise below that tells nothing of the model.
 const CALIBRATION: f64 = 1e-4;
@@ -125,14 +130,14 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
         return (polished, None);
     }
     let start = polished.motion().q_21;
-    let (q_21, excess) = best_rotation(observations, &polished, &start, sigma, GLANCE);
-    if excess >= SMALL {
+    let (q_21, excess, away) = best_rotation(observations, &polished, &start, sigma, GLANCE);
+    if excess >= SMALL || away >= FAR {
         return (polished, None);
     }
-    let (q_21, excess) = if inliers > GLANCE {
+    let (q_21, excess, _) = if inliers > GLANCE {
         best_rotation(observations, &polished, &q_21, sigma, ENOUGH)
     } else {
-        (q_21, excess)
+        (q_21, excess, away)
     };
     let share = inliers as f64 / observations.len() as f64;
     let likelihood = |count: usize| {
@@ -201,20 +206,21 @@ fn distinct(minima: &[Minimum]) -> Vec<&Minimum> {
     distinct
 }
 
-/// The best rotation for some of the inliers, and what it leaves.
+/// The best rotation for some of the inliers, what it leaves, and the median of that in standard deviations.
 fn best_rotation(
     observations: &Observations,
     polished: &Polished,
     start: &UnitQuaternion<f64>,
     sigma: f64,
     count: usize,
-) -> (UnitQuaternion<f64>, f64) {
+) -> (UnitQuaternion<f64>, f64, f64) {
     let inliers = &polished.pose.inliers[..polished.pose.inliers.len().min(count)];
     let framed = observations.framed(inliers);
     let q_21 = rotation_alone(observations, inliers, &framed, start, sigma);
     let general: Vec<f64> = inliers.iter().map(|&i| polished.pose.residuals()[i as usize].powi(2)).collect();
     let rotation = framed.square_errors(&q_21.to_rotation_matrix().into_inner());
-    (q_21, excess(&rotation, &general, sigma))
+    let excess = excess(&rotation, &general, sigma);
+    (q_21, excess, median_root(rotation) / sigma)
 }
 
 /// The local minimum of the greatest evidence: where the parallax is no more than the noise, which of the minima of the Sampson
