@@ -4,13 +4,11 @@
     python mujoco_robot.py --starts 3
 """
 
-import argparse
-
 import mujoco_world as world  # before MuJoCo: it chooses how that renders
 import mujoco
 import numpy as np
 
-from quest_pose.servo import GoalImage, Recorder, RobotServo, Servo
+from quest_pose.servo import GoalImage, RobotServo, Servo
 
 PERIOD = 0.1
 # The camera: metres ahead of the axle and above it, radians by which it looks down.
@@ -72,19 +70,5 @@ def run(seed, detector="sift", recorder=None, images=350):
     return command.arrived, end
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, default=1)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--detector", default="sift", choices=["sift", "orb"])
-    parser.add_argument("--record", metavar="RUN.npz", help="the last start's run, for quest-cli servo --replay")
-    given = parser.parse_args()
-    for seed in range(given.seed, given.seed + given.starts):
-        recorder = Recorder(given.record) if given.record else None
-        run(seed, given.detector, recorder)
-        if recorder:
-            recorder.save()
-
-
 if __name__ == "__main__":
-    main()
+    world.run_starts(run, __doc__)

@@ -3,6 +3,7 @@
 Rendering needs no screen: MUJOCO_GL=egl with libegl1 and libgl1-mesa-dri, or MUJOCO_GL=osmesa with libosmesa6.
 """
 
+import argparse
 import os
 
 os.environ.setdefault("MUJOCO_GL", "egl")
@@ -13,6 +14,7 @@ import mujoco
 import numpy as np
 
 import quest_pose as qp
+from quest_pose.servo import Recorder
 
 WIDTH, HEIGHT, FOVY = 320, 240, 45.0
 FOCAL = 0.5 * HEIGHT / np.tan(np.radians(FOVY) / 2)
@@ -115,3 +117,18 @@ class Eye:
 def away(goal, now):
     """How far ``now`` is from ``goal``, both (R, p): metres and degrees."""
     return float(np.linalg.norm(now[1] - goal[1])), angle(goal[0].T @ now[0])
+
+
+def run_starts(run, description):
+    """Reads the command line and calls ``run(seed, detector, recorder)`` from each start."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--starts", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--detector", default="sift", choices=["sift", "orb"])
+    parser.add_argument("--record", metavar="RUN.npz", help="the last start's run, for quest-cli servo --replay")
+    given = parser.parse_args()
+    for seed in range(given.seed, given.seed + given.starts):
+        recorder = Recorder(given.record) if given.record else None
+        run(seed, given.detector, recorder)
+        if recorder:
+            recorder.save()

@@ -21,8 +21,8 @@
 
 use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6};
 
-use crate::robust::conclude::evidence::{Explained, Likelihood};
-use crate::robust::data::point_transfer::{Displacement, Framed};
+use crate::robust::conclude::evidence::{Explained, Likelihood, without_two};
+use crate::robust::data::point_transfer::Displacement;
 
 /// Polynomials of two variables up to the fourth degree, but for the constant.
 const TERMS: usize = 14;
@@ -59,7 +59,7 @@ const FREE: f64 = 4.0;
 /// Normal equations have at least this share of their diagonal added: without a translation the field moves no point.
 const RIDGE: f64 = 1e-9;
 
-type Field = SVector<f64, TERMS>;
+pub(crate) type Field = SVector<f64, TERMS>;
 type Parameters = SVector<f64, PARAMETERS>;
 type Equations = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
@@ -83,12 +83,6 @@ pub(crate) struct Fit {
     pub(crate) covariance: Matrix6<f64>,
 }
 
-/// Matches and the polynomials at their points.
-pub(crate) struct Matches {
-    framed: Framed,
-    terms: Vec<Field>,
-}
-
 /// What a round sums up.
 struct Sums {
     equations: Equations,
@@ -99,16 +93,14 @@ struct Sums {
     nats: Vec<f64>,
 }
 
-impl Matches {
-    pub(crate) fn new(framed: Framed, still: &UnitQuaternion<f64>) -> Self {
-        let at: Vec<Vector2<f64>> =
-            framed.displacements(&still.to_rotation_matrix().into_inner()).iter().map(place).collect();
-        let count = at.len().max(1) as f64;
-        let mean = at.iter().sum::<Vector2<f64>>() / count;
-        let square = at.iter().map(|p| (p - mean).component_mul(&(p - mean))).sum::<Vector2<f64>>() / count;
-        let scale = square.map(|square| 1.0 / square.sqrt().max(1e-9));
-        Self { framed, terms: at.iter().map(|p| polynomials((p - mean).component_mul(&scale))).collect() }
-    }
+/// The polynomials at the points of the matches of a likelihood.
+pub(crate) fn terms(likelihood: &Likelihood, still: &UnitQuaternion<f64>) -> Vec<Field> {
+    let at: Vec<Vector2<f64>> = likelihood.displacements(still).iter().map(place).collect();
+    let count = at.len().max(1) as f64;
+    let mean = at.iter().sum::<Vector2<f64>>() / count;
+    let square = at.iter().map(|p| (p - mean).component_mul(&(p - mean))).sum::<Vector2<f64>>() / count;
+    let scale = square.map(|square| 1.0 / square.sqrt().max(1e-9));
+    at.iter().map(|p| polynomials((p - mean).component_mul(&scale))).collect()
 }
 
 /// Where the point is seen in view 1, in the plane.
@@ -176,10 +168,10 @@ impl DepthField {
     }
 
     /// So many rounds, and the likelihood of what they lead to. `None` where the matches do not determine the rotation.
-    pub(crate) fn fit(mut self, matches: &Matches, likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
+    pub(crate) fn fit(mut self, terms: &[Field], likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
         let precisions = precisions();
         for _ in 0..rounds {
-            let sums = self.round(matches, likelihood);
+            let sums = self.round(terms, likelihood);
             let inverse = regularised(&sums, &precisions)?;
             let mut gradient = sums.gradient;
             for (k, precision) in precisions.iter().enumerate() {
@@ -200,26 +192,26 @@ impl DepthField {
                 self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
             }
         }
-        let sums = self.round(matches, likelihood);
+        let sums = self.round(terms, likelihood);
         let covariance = regularised(&sums, &precisions)?.inverse();
         let prior: f64 = (0..TERMS).map(|k| precisions[k] * self.field[k] * self.field[k]).sum();
-        let nats = Likelihood::without_free(sums.nats) - 0.5 * prior;
+        let nats = without_two(sums.nats) - 0.5 * prior;
         let covariance: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
         let is_finite = nats.is_finite() && covariance.iter().all(|x| x.is_finite());
         is_finite.then_some(Fit { at: self, nats, covariance })
     }
 
-    fn round(&self, matches: &Matches, likelihood: &Likelihood) -> Sums {
+    fn round(&self, terms: &[Field], likelihood: &Likelihood) -> Sums {
         let mut sums = Sums {
             equations: Equations::zeros(),
             gradient: Parameters::zeros(),
             usual: 0.0,
             near: 0.0,
             square_spread: 0.0,
-            nats: Vec::with_capacity(matches.terms.len()),
+            nats: Vec::with_capacity(terms.len()),
         };
-        let all = matches.framed.displacements(&self.q_21.to_rotation_matrix().into_inner());
-        for (index, (d, terms)) in all.iter().zip(&matches.terms).enumerate() {
+        let all = likelihood.displacements(&self.q_21);
+        for (index, (d, terms)) in all.iter().zip(terms).enumerate() {
             self.add(&mut sums, d, terms, likelihood, index);
         }
         sums

@@ -197,13 +197,8 @@ impl Likelihood {
         found
     }
 
-    /// The sum of what the matches say, less what the free direction of the translation explains of any two.
-    pub(crate) fn without_free(nats: Vec<f64>) -> f64 {
-        without_two(nats)
-    }
-
     /// The displacements of the matches from where a rotation takes them.
-    fn displacements(&self, q_21: &UnitQuaternion<f64>) -> Vec<Displacement> {
+    pub(crate) fn displacements(&self, q_21: &UnitQuaternion<f64>) -> Vec<Displacement> {
         self.framed.displacements(&q_21.to_rotation_matrix().into_inner())
     }
 
@@ -280,7 +275,7 @@ impl Likelihood {
             near_sum += near / all;
             // The inverse depth that a point has, given where it is seen, mostly of the narrow part of the noise.
             let square = split.by_depth * split.by_depth;
-            let variance = (self.sigma * self.sigma).max(f64::MIN_POSITIVE);
+            let variance = self.variance();
             let share = depths.square_spread * square / (variance + depths.square_spread * square);
             let rho = depths.mean + share * (split.along / split.by_depth - depths.mean);
             let weight = usual / all;
@@ -301,8 +296,9 @@ impl Likelihood {
     }
 }
 
-/// The sum without its two largest terms, where they are positive.
-fn without_two(mut all: Vec<f64>) -> f64 {
+/// The sum of what the matches say without its two largest terms, where they are positive: the direction of the translation is free,
+/// which explains any two.
+pub(crate) fn without_two(mut all: Vec<f64>) -> f64 {
     let sum: f64 = all.iter().sum();
     all.sort_unstable_by(|a, b| b.total_cmp(a));
     sum - all.iter().take(2).map(|x| x.max(0.0)).sum::<f64>()

@@ -43,38 +43,50 @@ struct Component {
     covariance: Matrix6<f64>,
 }
 
-/// The mixture, `general` being the pose of the essential matrix, if it has a covariance.
+/// The mixture. `general` is the pose of the essential matrix and its covariance, asked for where no mode is known.
 pub(crate) fn mixture(
     observations: &Observations,
     small: &SmallMotion,
     sigma: f64,
-    general: Option<&Distribution>,
+    general: impl FnOnce() -> Option<Distribution>,
 ) -> Option<Distribution> {
-    let r_21 = small.q_21.to_rotation_matrix().into_inner();
-    let all: Vec<u32> = (0_u32..).take(observations.len().min(ENOUGH)).collect();
-    let squares = observations.framed(&all).square_errors(&r_21);
-    let limit = (EXPLAINED * small.sigma).powi(2);
-    let some: Vec<u32> = all.into_iter().zip(squares).filter(|(_, s)| *s < limit).map(|(i, _)| i).collect();
-    let framed = observations.framed(&some);
     let after = |q_21: &UnitQuaternion<f64>, t_21: Vector3<f64>| {
         let turn = (q_21 * small.q_21.inverse()).scaled_axis();
         Vector6::from_fn(|k, _| if k < 3 { turn[k] } else { t_21[k - 3] })
     };
     let mut components: Vec<Component> = small.modes.iter().map(|fit| of_mode(fit, &after)).collect();
-    if let (Some((pose, covariance)), true) = (general, components.is_empty()) {
-        let mean = after(&pose.q_21, pose.t_21);
-        components.push(Component { nats: small.nats, mean, covariance: *covariance });
+    if components.is_empty() {
+        components.extend(general().map(|(pose, covariance)| Component {
+            nats: small.nats,
+            mean: after(&pose.q_21, pose.t_21),
+            covariance,
+        }));
     }
-    let factor = rotation_hessian(&framed, &small.q_21).cholesky();
-    let is_possible = small.excess < NOT_A_ROTATION || components.is_empty();
-    if let Some(inverse) = factor.filter(|_| is_possible).map(|factor| factor.inverse()) {
-        let square = observations.columns.focal_length().powi(2) * some.len() as f64;
-        let mut covariance = Matrix6::zeros();
-        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&(inverse * (sigma * sigma)));
-        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() * (sigma * sigma / square)));
-        components.push(Component { nats: STILL, mean: Vector6::zeros(), covariance });
+    if small.excess < NOT_A_ROTATION || components.is_empty() {
+        components.extend(still(observations, small, sigma));
     }
     (!components.is_empty()).then(|| merged(&small.q_21, &components))
+}
+
+/// The rotation alone, over the matches that it explains; `None` where they do not determine it.
+fn still(observations: &Observations, small: &SmallMotion, sigma: f64) -> Option<Component> {
+    let r_21 = small.q_21.to_rotation_matrix().into_inner();
+    let all: Vec<u32> = (0_u32..).take(observations.len().min(ENOUGH)).collect();
+    let squares = observations.framed(&all).square_errors(&r_21);
+    let limit = (EXPLAINED * small.sigma).powi(2);
+    let some: Vec<u32> = all.into_iter().zip(squares).filter(|(_, s)| *s < limit).map(|(i, _)| i).collect();
+    let inverse = rotation_hessian(&observations.framed(&some), &small.q_21).cholesky()?.inverse();
+    let square = observations.columns.focal_length().powi(2) * some.len() as f64;
+    let mut covariance = Matrix6::zeros();
+    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&(inverse * (sigma * sigma)));
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() * (sigma * sigma / square)));
+    Some(Component { nats: STILL, mean: Vector6::zeros(), covariance })
+}
+
+/// A covariance of a rotation and a translation in another unit.
+fn in_unit(covariance: &Matrix6<f64>, scale: f64) -> Matrix6<f64> {
+    let units = Vector6::new(1.0, 1.0, 1.0, scale, scale, scale);
+    covariance.component_mul(&(units * units.transpose()))
 }
 
 /// A mode, its translation in units of the mean depth. The length of a translation with noise is too large: its square by the variance
@@ -85,11 +97,10 @@ fn of_mode(fit: &Fit, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vec
     let along = fit.at.t_21.dot(&(block * fit.at.t_21)) / square;
     let direction = ((block.trace() - along) / square).clamp(0.0, 1.0);
     let scale = 1.0 / fit.at.unit();
-    let units = Vector6::new(1.0, 1.0, 1.0, scale, scale, scale);
     Component {
         nats: fit.nats,
         mean: after(&fit.at.q_21, fit.at.t_21 * (scale * (1.0 - 0.5 * direction))),
-        covariance: fit.covariance.component_mul(&(units * units.transpose())) * (1.0 + CURVED * direction),
+        covariance: in_unit(&fit.covariance, scale) * (1.0 + CURVED * direction),
     }
 }
 
@@ -110,9 +121,7 @@ pub(crate) fn of_length((pose, covariance): Distribution, length: f64) -> Distri
     if !(scale > 0.0 && scale.is_finite()) {
         return (pose, covariance);
     }
-    let units = Vector6::new(1.0, 1.0, 1.0, scale, scale, scale);
-    let scaled = covariance.component_mul(&(units * units.transpose()));
-    (RelativePose::new(pose.q_21, pose.t_21 * scale), scaled)
+    (RelativePose::new(pose.q_21, pose.t_21 * scale), in_unit(&covariance, scale))
 }
 
 /// The mean and the covariance of a mixture.

@@ -81,9 +81,8 @@ pub(crate) fn report(
     let size = length(observations, &motion, inliers, &noise);
     let pose = with_length(&motion, size);
     let (pose, covariance) = if let Some(small) = &small {
-        let general = covariance::of_pose(observations, &polished, size, false_matches);
-        let general = general.map(|covariance| (pose, covariance));
-        of_small_motion(observations, small, general.as_ref(), model, inliers, &noise)?
+        let general = || Some((pose, covariance::of_pose(observations, &polished, size, false_matches)?));
+        of_small_motion(observations, small, general, model, inliers, &noise)?
     } else if model == Model::PureRotation {
         (pose, covariance::of_rotation(observations, &motion.q_21, inliers, sigma, size)?)
     } else {
@@ -129,7 +128,7 @@ fn chosen(answer: Answer, (motion, second): (Motion, Option<Motion>)) -> (Motion
 fn of_small_motion(
     observations: &Observations,
     small: &SmallMotion,
-    general: Option<&Distribution>,
+    general: impl FnOnce() -> Option<Distribution>,
     model: Model,
     inliers: &[u32],
     noise: &Noise,

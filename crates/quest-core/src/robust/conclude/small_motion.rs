@@ -5,7 +5,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::robust::conclude::depth_field::{DepthField, Fit, Matches};
+use crate::robust::conclude::depth_field::{self, DepthField, Fit};
 use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
 use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, median_root, rotation_alone};
@@ -149,27 +149,26 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
         (polished, minima) = likeliest(poses, polished, &q_21, sigma, &likelihood(COMPARED));
     }
     let (polished, is_likely) = without_chance(poses, polished, &likelihood(usize::MAX));
-    let Evidence { nats, mean_depth, .. } = likelihood(WEIGHED).of(polished.motion(), ROUNDS);
+    let weighed = likelihood(WEIGHED);
+    let Evidence { nats, mean_depth, .. } = weighed.of(polished.motion(), ROUNDS);
     minima.push(Minimum { nats: f64::INFINITY, motion: *polished.motion(), mean_depth });
-    let modes = modes(observations, &q_21, &minima, &likelihood);
+    let modes = modes(&q_21, &minima, &likelihood(EXPLORED), &weighed);
     let nats = modes.first().map_or(nats, |mode| mode.nats.max(nats));
     (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, modes }))
 }
 
 /// The poses that explain the matches with points at depths that follow a smooth field, from each of the minima and from no
-/// translation at all: those that are nearly as likely as the likeliest.
+/// translation at all: those that are nearly as likely as the likeliest, by some of the matches first and then by many.
 fn modes(
-    observations: &Observations,
     q_21: &UnitQuaternion<f64>,
     minima: &[Minimum],
-    likelihood: &impl Fn(usize) -> Likelihood,
+    of_some: &Likelihood,
+    of_many: &Likelihood,
 ) -> Vec<Fit> {
-    let fitted = |starts: Vec<DepthField>, count: usize, rounds: usize| {
-        let indices: Vec<u32> = (0_u32..).take(observations.len().min(count)).collect();
-        let matches = Matches::new(observations.framed(&indices), q_21);
-        let likelihood = likelihood(count);
+    let fitted = |starts: Vec<DepthField>, likelihood: &Likelihood, rounds: usize| {
+        let terms = depth_field::terms(likelihood, q_21);
         let mut fits: Vec<Fit> =
-            starts.into_iter().filter_map(|start| start.fit(&matches, &likelihood, rounds)).collect();
+            starts.into_iter().filter_map(|start| start.fit(&terms, likelihood, rounds)).collect();
         fits.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         let mut distinct: Vec<Fit> = Vec::new();
         for fit in fits {
@@ -186,8 +185,8 @@ fn modes(
         let t_21 = minimum.motion.direction * minimum.mean_depth;
         DepthField::start(minimum.motion.q_21, t_21, USUAL)
     }));
-    let explored = fitted(starts, EXPLORED, EXPLORING_ROUNDS);
-    fitted(explored.into_iter().map(|fit| fit.at).collect(), WEIGHED, FIELD_ROUNDS)
+    let explored = fitted(starts, of_some, EXPLORING_ROUNDS);
+    fitted(explored.into_iter().map(|fit| fit.at).collect(), of_many, FIELD_ROUNDS)
 }
 
 /// The likeliest minima whose directions differ.
