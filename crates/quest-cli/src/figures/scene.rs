@@ -72,7 +72,7 @@ pub(super) fn images(drawn: &Drawn) -> Panel {
     };
     let ([x0, x1], [y0, y1]) = (extent(0), extent(1));
     let (x, y) = (Axis::linear("x / z").range(x0, x1), Axis::linear("y / z").range(y1, y0));
-    let mut panel = Panel::new("B.21: both images, view 1 × and view 2 •", x, y).equal_scales();
+    let mut panel = Panel::new("B.21: images 1 (×) and 2 (•)", x, y).equal_scales();
     for (k, [p1, p2]) in pairs.into_iter().enumerate() {
         panel = panel
             .with(
