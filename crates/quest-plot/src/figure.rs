@@ -130,6 +130,8 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
     /// A band around the curve, such as a confidence interval: `[x, low, high]`; empty for none.
     pub band: Vec<[f64; 3]>,
+    /// For each point the curve that a page draws in the other panels of the row while the pointer is over it; empty for none.
+    pub beside: Vec<Vec<[f64; 2]>>,
 }
 
 impl Series {
@@ -137,7 +139,21 @@ impl Series {
     #[must_use]
     pub fn line(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         let name = name.into();
-        Self { label: name.clone(), name, colour: colour::INK, style: Style::Line, points, band: Vec::new() }
+        Self {
+            label: name.clone(),
+            name,
+            colour: colour::INK,
+            style: Style::Line,
+            points,
+            band: Vec::new(),
+            beside: Vec::new(),
+        }
+    }
+
+    /// Sets the curves that are drawn beside the points, one a point.
+    #[must_use]
+    pub fn beside(self, beside: Vec<Vec<[f64; 2]>>) -> Self {
+        Self { beside, ..self }
     }
 
     /// Dots, without a label.

@@ -95,7 +95,16 @@ fn an_estimate_becomes_a_page() {
         let estimate: serde_json::Value = serde_json::from_str(&printed).unwrap();
         let count =
             format!("{} of {}", estimate["inlier_count"], estimate["inliers"].as_array().unwrap().len());
-        for words in [&count, model, "outliers", "camera 1", "Matches over both images"] {
+        for words in [
+            &count,
+            model,
+            "outliers",
+            "camera 1",
+            "Matches over both images",
+            "95 % of camera 2",
+            "against the noise",
+            "customdata",
+        ] {
             assert!(ours.contains(words), "{name}: {words}");
         }
         assert_eq!(ours.contains("second pose"), !estimate["runner_up"].is_null());
@@ -113,7 +122,7 @@ fn an_estimate_is_shown_in_a_browser() {
     let given = example("hololens_00011_00015.json");
     let found = run_in(directory.path(), &["view", &given, "--estimate", "--quiet", "-o", "view.html"], b"");
     assert_eq!(found.status, 0, "{}", found.stderr);
-    assert!(opened(&directory.path().join("view.html")).starts_with("4 plots"));
+    assert!(opened(&directory.path().join("view.html")).starts_with("5 plots"));
 }
 
 #[test]

@@ -69,6 +69,7 @@ fn curve(panel: &Panel, series: &Series) -> Box<Scatter<f64, f64>> {
     let drawn = Scatter::new(x, y)
         .name(series.name.as_str())
         .hover_template(format!("{}: %{{x:.4~g}}<br>{}: %{{y:.4~g}}", panel.x.label, panel.y.label));
+    let drawn = if series.beside.is_empty() { drawn } else { drawn.custom_data(paths(series)) };
     let line = Line::new().color(colour.clone());
     let marker = Marker::new().color(colour);
     // Only a drawing has its words within: at axes the legend names the curves.
@@ -95,6 +96,15 @@ fn curve(panel: &Panel, series: &Series) -> Box<Scatter<f64, f64>> {
         Style::Points => drawn.mode(Mode::Markers).marker(marker.size(6)),
         Style::Crosses => drawn.mode(Mode::Markers).marker(marker.size(9).symbol(MarkerSymbol::X)),
     }
+}
+
+/// The curves beside the points, as paths of SVG in the units of the axes.
+fn paths(series: &Series) -> Vec<String> {
+    let path = |curve: &Vec<[f64; 2]>| {
+        let points: Vec<_> = curve.iter().map(|[x, y]| format!("{x:.4},{y:.4}")).collect();
+        if points.is_empty() { String::new() } else { format!("M{}", points.join("L")) }
+    };
+    series.beside.iter().map(path).collect()
 }
 
 /// The label at the last point, and none at the others.

@@ -5,6 +5,15 @@ for (const section of document.querySelectorAll("section")) {
   for (const plot of plots) {
     const { data, layout } = JSON.parse(plot.nextElementSibling.textContent);
     Plotly.newPlot(plot, data, layout, { responsive: true, displayModeBar: false });
+    // A point may have a curve that belongs into the other panels of its row.
+    if (!data.some((trace) => trace.customdata)) continue;
+    const others = [...plot.closest(".row").querySelectorAll(".plot")].filter((other) => other !== plot);
+    const draw = (shapes) => others.forEach((other) => Plotly.relayout(other, { shapes }));
+    plot.on("plotly_hover", ({ points: [point] }) => {
+      const line = { color: point.fullData.marker.color, width: 2 };
+      draw(point.customdata ? [{ type: "path", path: point.customdata, line }] : []);
+    });
+    plot.on("plotly_unhover", () => draw([]));
   }
   const show = (button, isShown) => {
     button.setAttribute("aria-pressed", isShown);

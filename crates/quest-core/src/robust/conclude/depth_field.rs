@@ -56,6 +56,9 @@ const MOST_NEAR: f64 = 0.9;
 /// ones there are a third and a fourth that agree with some two.
 const FREE: f64 = 4.0;
 
+/// A step may lower the likelihood by so many nats: one that is longer than that of EM overshoots a little near the limit.
+const LOST: f64 = 1.0;
+
 /// Normal equations have at least this share of their diagonal added: without a translation the field moves no point.
 const RIDGE: f64 = 1e-9;
 
@@ -168,37 +171,78 @@ impl DepthField {
     }
 
     /// So many rounds, and the likelihood of what they lead to. `None` where the matches do not determine the rotation.
+    ///
+    /// A step that lowers the likelihood is halved: behind the translation without length lies the one of the opposite sign,
+    /// which puts near points behind the cameras.
     pub(crate) fn fit(mut self, terms: &[Field], likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
         let precisions = precisions();
+        let (mut sums, mut from) = (self.round(terms, likelihood), None);
         for _ in 0..rounds {
-            let sums = self.round(terms, likelihood);
-            let inverse = regularised(&sums, &precisions)?;
-            let mut gradient = sums.gradient;
-            for (k, precision) in precisions.iter().enumerate() {
-                gradient[6 + k] += precision * self.field[k];
+            let worth = self.worth(&sums, &precisions);
+            match from.take() {
+                Some((before, step, before_worth)) if worth < before_worth - LOST => {
+                    let step: Parameters = step * 0.5;
+                    self = Self::stepped(&before, &step);
+                    from = Some((before, step, before_worth));
+                }
+                _ => {
+                    let step = self.step(&sums, &precisions)?;
+                    let next = Self::stepped(&self, &step).with_shares(&sums);
+                    from = Some((std::mem::replace(&mut self, next), step, worth));
+                }
             }
-            let step = -inverse.solve(&gradient);
-            if !step.iter().all(|x| x.is_finite()) {
-                return None;
-            }
-            self.q_21 = UnitQuaternion::new(step.fixed_rows::<3>(0).into_owned()) * self.q_21;
-            self.t_21 += step.fixed_rows::<3>(3);
-            self.field += step.fixed_rows::<TERMS>(6);
-            if sums.usual > 0.0 {
-                let ratio = sums.square_spread / sums.usual / self.square_spread;
-                let ratio = ratio.clamp(1.0 / MOST_CHANGE, MOST_CHANGE).powf(RELAXED);
-                self.square_spread = (self.square_spread * ratio).max(LEAST_SPREAD);
-                let near = (sums.near - FREE).max(0.0);
-                self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
-            }
+            sums = self.round(terms, likelihood);
         }
-        let sums = self.round(terms, likelihood);
+        if let Some((before, ..)) = from.filter(|from| self.worth(&sums, &precisions) < from.2 - LOST) {
+            self = before;
+            sums = self.round(terms, likelihood);
+        }
         let covariance = regularised(&sums, &precisions)?.inverse();
-        let prior: f64 = (0..TERMS).map(|k| precisions[k] * self.field[k] * self.field[k]).sum();
-        let nats = without_two(sums.nats) - 0.5 * prior;
+        let nats = without_two(sums.nats) - self.surprise(&precisions);
         let covariance: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
         let is_finite = nats.is_finite() && covariance.iter().all(|x| x.is_finite());
         is_finite.then_some(Fit { at: self, nats, covariance })
+    }
+
+    /// The logarithm of the likelihood and of what is known of the field before any match is seen, which the rounds increase.
+    fn worth(&self, sums: &Sums, precisions: &Field) -> f64 {
+        sums.nats.iter().sum::<f64>() - self.surprise(precisions)
+    }
+
+    /// By how many nats the field is less likely than a flat one, before any match is seen.
+    fn surprise(&self, precisions: &Field) -> f64 {
+        0.5 * (0..TERMS).map(|k| precisions[k] * self.field[k] * self.field[k]).sum::<f64>()
+    }
+
+    /// The step of Gauss and Newton.
+    fn step(&self, sums: &Sums, precisions: &Field) -> Option<Parameters> {
+        let mut gradient = sums.gradient;
+        for (k, precision) in precisions.iter().enumerate() {
+            gradient[6 + k] += precision * self.field[k];
+        }
+        let step = -regularised(sums, precisions)?.solve(&gradient);
+        step.iter().all(|x| x.is_finite()).then_some(step)
+    }
+
+    fn stepped(&self, step: &Parameters) -> Self {
+        Self {
+            q_21: UnitQuaternion::new(step.fixed_rows::<3>(0).into_owned()) * self.q_21,
+            t_21: self.t_21 + step.fixed_rows::<3>(3),
+            field: self.field + step.fixed_rows::<TERMS>(6),
+            ..*self
+        }
+    }
+
+    /// The same with the spread and the share of near points that a round of EM says.
+    fn with_shares(mut self, sums: &Sums) -> Self {
+        if sums.usual > 0.0 {
+            let ratio = sums.square_spread / sums.usual / self.square_spread;
+            let ratio = ratio.clamp(1.0 / MOST_CHANGE, MOST_CHANGE).powf(RELAXED);
+            self.square_spread = (self.square_spread * ratio).max(LEAST_SPREAD);
+            let near = (sums.near - FREE).max(0.0);
+            self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
+        }
+        self
     }
 
     fn round(&self, terms: &[Field], likelihood: &Likelihood) -> Sums {

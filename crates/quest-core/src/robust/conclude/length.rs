@@ -17,6 +17,9 @@ use crate::solver::shared::motion::Motion;
 /// A depth stands clear of its noise at this many standard deviations.
 const CLEAR: f64 = 3.0;
 
+/// More points are in front of the cameras than behind by so many standard deviations of a vote by chance.
+const BY_CHANCE: f64 = 2.0;
+
 /// The share of depths that must stand clear.
 const MOST: f64 = 0.9;
 
@@ -74,7 +77,13 @@ impl BothDepths {
     }
 
     fn is_clear(&self) -> bool {
-        self.rho.iter().all(|rho| rho.value > 0.0) && self.relative() < 1.0 / (CLEAR * CLEAR)
+        self.side() > 0.0
+    }
+
+    /// One in front of both cameras, minus one behind both, zero where neither stands clear.
+    fn side(&self) -> f64 {
+        let [first, second] = [0, 1].map(|k| self.rho[k].value.signum());
+        if first == second && self.relative() < 1.0 / (CLEAR * CLEAR) { first } else { 0.0 }
     }
 }
 
@@ -161,20 +170,39 @@ fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
     }
 }
 
-/// The median of the inverse depths, with the slope of their mean.
+/// The median of the inverse depths, with the slope of their mean. It is positive where near points say so: the median of distant
+/// ones is noise, whose sign would turn the translation around.
 fn by_inverse_depths(all: &[BothDepths]) -> Length {
     let count = all.len() as f64;
     let [mut first, mut second] =
         [0, 1].map(|k| all.iter().map(|depth| depth.rho[k].value).collect::<Vec<_>>());
     let variance: f64 = all.iter().map(|depth| depth.variance).sum();
-    let all = || all.iter().flat_map(|depth| &depth.rho);
+    let rhos = || all.iter().flat_map(|depth| &depth.rho);
+    let of_median = 0.5 * (median(&mut first) + median(&mut second));
+    let variance = MEDIAN_VARIANCE * variance / (count * count);
+    let (value, slope) = if are_in_front(all) { positive(of_median, variance) } else { (of_median, 1.0) };
+    let by_mean = slope / (2.0 * count);
     Length {
-        value: 0.5 * (median(&mut first) + median(&mut second)),
-        variance: MEDIAN_VARIANCE * variance / (count * count),
+        value,
+        variance,
         is_clear: false,
-        by_rotation: all().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() / (2.0 * count),
-        by_direction: all().map(|rho| rho.by_direction).sum::<Vector3<f64>>() / (2.0 * count),
+        by_rotation: rhos().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() * by_mean,
+        by_direction: rhos().map(|rho| rho.by_direction).sum::<Vector3<f64>>() * by_mean,
     }
+}
+
+/// Whether the points whose depths stand clear of their noise are in front, by more than chance.
+fn are_in_front(all: &[BothDepths]) -> bool {
+    let sides = || all.iter().map(BothDepths::side);
+    let (sum, count) = (sides().sum::<f64>(), sides().map(f64::abs).sum::<f64>());
+    sum > BY_CHANCE * count.sqrt()
+}
+
+/// About the mean of a normal variable that is known to be positive, and its derivative by the mean that it would have otherwise: the
+/// same at zero and far from it.
+fn positive(mean: f64, variance: f64) -> (f64, f64) {
+    let root = (mean * mean + 8.0 / std::f64::consts::PI * variance).sqrt().max(f64::MIN_POSITIVE);
+    (0.5 * (mean + root), 0.5 * (1.0 + mean / root))
 }
 
 fn median(values: &mut [f64]) -> f64 {

@@ -152,7 +152,10 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
     let weighed = likelihood(WEIGHED);
     let Evidence { nats, mean_depth, .. } = weighed.of(polished.motion(), ROUNDS);
     minima.push(Minimum { nats: f64::INFINITY, motion: *polished.motion(), mean_depth });
-    let modes = modes(&q_21, &minima, &likelihood(EXPLORED), &weighed);
+    let least_depth = sigma / observations.columns.focal_length();
+    let mut modes = modes(&q_21, &minima, least_depth, &likelihood(EXPLORED), &weighed);
+    // Where none explains the matches as well as the essential matrix does, the depths are of another kind.
+    modes.retain(|mode| mode.nats > nats - UNLIKELY);
     let nats = modes.first().map_or(nats, |mode| mode.nats.max(nats));
     (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, modes }))
 }
@@ -162,6 +165,7 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
 fn modes(
     q_21: &UnitQuaternion<f64>,
     minima: &[Minimum],
+    least_depth: f64,
     of_some: &Likelihood,
     of_many: &Likelihood,
 ) -> Vec<Fit> {
@@ -182,7 +186,8 @@ fn modes(
     };
     let mut starts = vec![DepthField::start(*q_21, Vector3::zeros(), EVEN)];
     starts.extend(distinct(minima).iter().map(|minimum| {
-        let t_21 = minimum.motion.direction * minimum.mean_depth;
+        // The mean of distant points is noise, and may be behind the cameras.
+        let t_21 = minimum.motion.direction * minimum.mean_depth.max(least_depth);
         DepthField::start(minimum.motion.q_21, t_21, USUAL)
     }));
     let explored = fitted(starts, of_some, EXPLORING_ROUNDS);
