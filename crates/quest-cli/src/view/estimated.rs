@@ -116,6 +116,7 @@ fn space(pair: &Pair, matches: &[Correspondence], found: &Estimate) -> Space {
         let depths = found.pose.depths(m);
         let ends = scene::ends(&found.pose, m);
         if let (Some((z1, z2)), Some([x, _])) = (depths, ends)
+            && z1.min(z2) > 0.0
             && x.norm() <= scene::FARTHEST
         {
             points.points.push((x.into(), format!("match {index}<br>depths {z1:.3}, {z2:.3}")));

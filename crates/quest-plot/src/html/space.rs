@@ -30,6 +30,9 @@ pub(super) fn plot(space: &Space) -> Plot {
     plot
 }
 
+/// More points than this are drawn smaller.
+const MANY: usize = 100;
+
 fn add(plot: &mut Plot, part: &Part) {
     let colour = part.colour.hex();
     let trace = |points: &[[f64; 3]]| {
@@ -46,7 +49,9 @@ fn add(plot: &mut Plot, part: &Part) {
     }
     if !part.points.is_empty() {
         let (points, words): (Vec<_>, Vec<_>) = part.points.iter().cloned().unzip();
-        let marker = Marker::new().color(colour.clone()).size(5);
+        // Many points hide each other.
+        let size = if points.len() > MANY { 2 } else { 5 };
+        let marker = Marker::new().color(colour.clone()).size(size);
         let named = trace(&points).mode(Mode::Markers).marker(marker);
         plot.add_trace(named.hover_text_array(words).hover_info(HoverInfo::Text));
     }

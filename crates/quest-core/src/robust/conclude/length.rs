@@ -82,8 +82,9 @@ impl BothDepths {
 
     /// One in front of both cameras, minus one behind both, zero where neither stands clear.
     fn side(&self) -> f64 {
-        let [first, second] = [0, 1].map(|k| self.rho[k].value.signum());
-        if first == second && self.relative() < 1.0 / (CLEAR * CLEAR) { first } else { 0.0 }
+        let [first, second] = [0, 1].map(|k| self.rho[k].value);
+        let is_clear = first * second > 0.0 && self.relative() < 1.0 / (CLEAR * CLEAR);
+        if is_clear { first.signum() } else { 0.0 }
     }
 }
 
