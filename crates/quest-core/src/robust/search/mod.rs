@@ -202,8 +202,9 @@ impl<'a> Search<'a> {
             self.look_at(source, &mut round);
             self.learn(&mut guide, &round, draws.size);
             enough = self.enough(&mut guide, limits, is_chance);
-            // What a few samples more would end is not worth an order.
-            let is_long = enough - self.iterations.min(enough) > matches / RANKED_PER_SAMPLE;
+            // What a few samples more would end is not worth an order, nor what the least number ends.
+            let is_long = enough - self.iterations.min(enough) > matches / RANKED_PER_SAMPLE
+                && enough > limits.min_iterations;
             if self.iterations >= UNRANKED && is_long && !guide.is_ranked() && !guide.is_too_small() {
                 guide.rank(chart(self.observations), None);
                 enough = self.enough(&mut guide, limits, is_chance);
