@@ -33,33 +33,34 @@ const PARAMETERS: usize = 6 + TERMS;
 /// at its sides as in the middle has 0.3.
 const RELIEF: f64 = 0.3;
 
-/// Points this many deviations from the middle of the points have the field of those that are there: polynomials grow beyond.
+/// The field is constant beyond this many deviations from the middle of the points, where polynomials would grow. Points that are
+/// uniform in the image end at 1.73.
 const FARTHEST: f64 = 1.8;
 
 /// The least spread of the inverse depths, squared.
 const LEAST_SPREAD: f64 = 1e-8;
 
-/// The square of the spread changes in a round by what EM says to this power, which goes nearly twice as fast to the same limit, and by
-/// not more than this before.
+/// A round changes the square of the spread by what EM says, to this power: that goes nearly twice as fast to the same limit, and
+/// any power below two converges. What EM says counts as at most this factor.
 const RELAXED: f64 = 1.8;
 const MOST_CHANGE: f64 = 3.0;
 
-/// Displacements by a unit of inverse depth below this, in pixels, have no direction.
+/// A displacement by a unit of inverse depth that is shorter than this, in pixels, has no direction.
 const LEAST_LENGTH: f64 = 1e-9;
 
-/// The share of near points to begin with, the least and the most.
+/// The share of near points to begin with, and its bounds, which keep both explanations possible.
 const NEAR: f64 = 0.02;
 const LEAST_NEAR: f64 = 1e-6;
 const MOST_NEAR: f64 = 0.9;
 
-/// So many near points are there by chance: the direction of the translation is free to fit two false matches, and among thirty false
-/// ones there are a third and a fourth that agree with some two.
+/// So many near points are chance: the direction of the translation is free to fit two false matches, and among thirty false matches
+/// a third and a fourth agree with some two.
 const FREE: f64 = 4.0;
 
 /// A step may lower the likelihood by so many nats: one that is longer than that of EM overshoots a little near the limit.
 const LOST: f64 = 1.0;
 
-/// Normal equations have at least this share of their diagonal added: without a translation the field moves no point.
+/// This share of the diagonal is added to the normal equations, which are singular without a translation: the field moves no point.
 const RIDGE: f64 = 1e-9;
 
 pub(crate) type Field = SVector<f64, TERMS>;

@@ -28,18 +28,18 @@ use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::{Displacement, Framed};
 use crate::solver::shared::motion::Motion;
 
-/// The shares and the widths of the noise: one keypoint in ten is three times less sharp. Between 5 and 20 % and from two to
-/// five times the rule is the same.
+/// The shares and the widths of the noise: one keypoint in ten is three times less sharp. The decisions are not sensitive to them
+/// between 5 and 20 % and between two and five times.
 const TAILS: [[f64; 2]; 2] = [[0.9, 1.0], [0.1, 3.0]];
 
-/// Near points are told from others beyond this multiple of the noise.
+/// The density of near points is flat below this multiple of the noise, where they cannot be told from others.
 const NEAREST: f64 = 3.0;
 
-/// The share of near points to begin with.
+/// The share of near points to begin with. EM changes it.
 const NEAR: f64 = 0.05;
 
-/// A near point is believed where at least this much of its probability is that it is one: a false match that lies near its
-/// epipolar line by chance looks like a near point.
+/// A match counts as a near point where at least this much of its probability says so. A false match that lies near its epipolar line
+/// by chance looks like a near point, and has the lever of one.
 const BELIEVED: f64 = 0.9;
 
 /// Rounds of EM. Twelve leave Λ within a tenth of its limit.

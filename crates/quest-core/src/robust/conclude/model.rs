@@ -26,33 +26,34 @@ use crate::robust::estimate::{Evidence, Model};
 use crate::robust::refine::loss::CAP;
 use crate::robust::search::search_score::MANY;
 
-/// With few matches a rotation alone is enough below this.
+/// With fewer than [`MANY`] matches a rotation alone is enough where it leaves less than this: one, and its scatter.
 const ROTATION: f64 = 3.0;
 
-/// A rotation alone is enough while the evidence against it is below this, in nats. With 12, 98.3 % of 600 rotations in place of 100 and of
-/// 500 matches are named.
+/// A rotation alone is enough while the evidence against it is below this, in nats. Measured with rotations in place of 100 and 500
+/// matches: 12 names 98.3 % of 600, 13 names 98.7 to 100 %.
 const EVIDENT: f64 = 13.0;
 
-/// A plane has to explain all but this share of what a rotation leaves: where that is little, any plane leaves little.
+/// A plane has to explain all but this share of what a rotation leaves. Where a rotation leaves little, every plane leaves little,
+/// and the rule for larger motions would call volumes planes.
 const UNEXPLAINED: f64 = 0.1;
 
-/// Points whose inverse depths differ by more than this share of their mean from those of a plane are no plane.
+/// Points are no plane if their inverse depths differ from those of a plane by more than this share of their mean.
 const FLAT: f64 = 0.1;
 
-/// A plane is enough below this, and a little above it where there are few matches.
+/// A plane is enough where it leaves less than this: one, and room for a real wall. With `n` matches it may leave `20/n` more.
 const PLANE: f64 = 1.7;
 const PLANE_OF_FEW: f64 = 20.0;
 
-/// A plane is exact below this, at the noise that the matches show: one, and its scatter for a hundred matches. It is not more
-/// than so many standard deviations of that scatter above one, whatever the number of matches.
+/// A plane is exact where it leaves less than this at the noise that the matches show: one, and its scatter with a hundred matches.
+/// With more matches it must be within so many standard deviations of the scatter above one.
 const EXACT_PLANE: f64 = 1.3;
 const EXACT_DEVIATIONS: f64 = 2.5;
 
-/// The noise that models are compared at is not taken to be below this share of the threshold: of noise so small
-/// every real camera's calibration error stands clear.
+/// Models are compared at a noise of at least this share of the threshold. With less noise the calibration error of every
+/// real camera would decide.
 const LEAST_NOISE: f64 = 0.3;
 
-/// More matches than this are not looked at.
+/// So many matches decide. This bounds the time: the scatter of `F` is 8 % then.
 const ENOUGH: usize = 300;
 
 /// Which model, and why.
