@@ -31,7 +31,7 @@ class PolynomialSolutions(NamedTuple):
 
     @property
     def real(self) -> NDArray[np.float64]:
-        """(R, n): the real solutions."""
+        """The real solutions, one a row."""
         return self.x[self.is_real].real
 
 

@@ -34,6 +34,12 @@ pub(crate) struct Alternative {
     refined: Scored,
 }
 
+impl Alternative {
+    pub(crate) fn motion(&self) -> &Motion {
+        &self.of_plane.motion
+    }
+}
+
 /// The two motions of a plane.
 pub(crate) fn alternatives(poses: &mut PoseScorer, plane: &Plane, polished: &Polished) -> Vec<Alternative> {
     let wide = WIDE * poses.threshold();
@@ -146,11 +152,11 @@ pub(crate) fn second_of_few(all: &[Scored], best: &Motion) -> Option<Motion> {
     different.min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|s| s.motion)
 }
 
-fn is_same(a: &Motion, b: &Motion) -> bool {
+pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
     a.q_21.angle_to(&b.q_21) < SAME && a.direction.dot(&b.direction) > SAME_DIRECTION.cos()
 }
 
 /// How far one motion is from another, in radians of rotation and of direction together.
-fn distance(a: &Motion, b: &Motion) -> f64 {
+pub(crate) fn distance(a: &Motion, b: &Motion) -> f64 {
     a.q_21.angle_to(&b.q_21) + a.direction.angle(&b.direction)
 }

@@ -62,7 +62,7 @@ pub(crate) fn conclude(
     if inliers < MIN_MATCHES || log_alarms > max_false_alarms.log10() {
         return Err(no_pose(observations, inliers, false_share));
     }
-    let (polished, small) = small_motion::look(poses, polished);
+    let (polished, small) = small_motion::look(poses, polished, &others);
     let verdict = choose(observations, &polished, plane.as_ref(), small.as_ref());
     let over_all = plane
         .filter(|_| verdict.model == Model::Planar)

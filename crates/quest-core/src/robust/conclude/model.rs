@@ -94,10 +94,12 @@ pub(crate) fn choose(
         None => observations.len() < MANY && excess(&rotation, &general, sigma) < ROTATION,
     };
     let is_plane = match small {
-        Some(SmallMotion { excess, sigma, modes, .. }) => {
-            let explains = || of_plane(*sigma) - 1.0 < UNEXPLAINED * (excess - 1.0);
-            let is_flat = modes.first().is_none_or(|mode| mode.at.off_plane() < FLAT);
-            is_plane(*sigma) && is_flat && (*excess > NOT_A_ROTATION || explains())
+        Some(small) => {
+            let SmallMotion { excess, sigma, .. } = *small;
+            let explains = || of_plane(sigma) - 1.0 < UNEXPLAINED * (excess - 1.0);
+            // Of the two motions of a plane one may be so short that the field bends.
+            let is_flat = small.modes.is_empty() || small.likely().any(|mode| mode.at.off_plane() < FLAT);
+            is_plane(sigma) && is_flat && (excess > NOT_A_ROTATION || explains())
         }
         None => is_plane(sigma),
     };
@@ -107,9 +109,9 @@ pub(crate) fn choose(
         (false, false) => Model::General,
     };
     let scatter = (2.0 / inliers.len().max(1) as f64).sqrt();
-    // Of a small motion any plane explains much.
-    let is_exact_plane =
-        small.is_none() && of_plane(noise) < EXACT_PLANE.min(1.0 + EXACT_DEVIATIONS * scatter);
+    // Of a motion that hardly stands clear of its noise any plane explains much.
+    let is_clear = small.is_none_or(|small| model == Model::Planar && small.is_clear());
+    let is_exact_plane = is_clear && of_plane(noise) < EXACT_PLANE.min(1.0 + EXACT_DEVIATIONS * scatter);
     let evidence = Evidence {
         rotation_px: median_root(rotation),
         planar_px: planar.map_or(f64::INFINITY, median_root),

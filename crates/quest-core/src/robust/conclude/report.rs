@@ -5,7 +5,9 @@ use nalgebra::UnitQuaternion;
 use crate::RelativePose;
 use crate::robust::MIN_MATCHES;
 
-use crate::robust::conclude::alternatives::{Alternative, as_likely, both_of_plane, second_of_few};
+use crate::robust::conclude::alternatives::{
+    Alternative, as_likely, both_of_plane, distance, is_same, second_of_few,
+};
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
@@ -63,7 +65,10 @@ pub(crate) fn report(
     polished.pose = poses.score(motion, poses.threshold());
     // The motions of an exact plane have a covariance of their own.
     let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
-    let small = small.filter(|_| !is_of_plane && matches!(answer, Answer::Best));
+    let small = small.filter(|_| !is_of_plane && matches!(answer, Answer::Best)).map(|small| match model {
+        Model::Planar => small.without_twins(),
+        _ => small,
+    });
     if let Some(small) = &small {
         polished.pose.inliers.retain(|&i| small.is_likely[i as usize]);
     } else if model == Model::PureRotation {
@@ -91,8 +96,11 @@ pub(crate) fn report(
         let open = || matches!(answer, Answer::Given(_)).then(|| covariance::of_nothing(&pose));
         (pose, known.or_else(open)?)
     };
-    if let (Some(small), Model::General) = (&small, model) {
-        second = small.other_mode(&pose.t_21).or(second);
+    match (&small, model) {
+        (Some(small), Model::General) => second = small.other_mode(&pose.t_21).or(second),
+        // The likelihood may have chosen the other motion of the plane.
+        (Some(_), Model::Planar) => second = farther(&pose, [Some(motion), second]),
+        _ => {}
     }
     let mut mask = vec![false; observations.given];
     for &i in inliers {
@@ -113,6 +121,18 @@ pub(crate) fn report(
         false_share,
         unmoved: 0,
     })
+}
+
+/// Of two motions the one that is farther from a pose, where that is another.
+fn farther(pose: &RelativePose, motions: [Option<Motion>; 2]) -> Option<Motion> {
+    let direction = pose.t_21.try_normalize(f64::MIN_POSITIVE)?;
+    let own = Motion { q_21: pose.q_21, direction };
+    let [first, second] = motions;
+    let farthest = match (first, second) {
+        (Some(a), Some(b)) if distance(&a, &own) < distance(&b, &own) => b,
+        (first, second) => first.or(second)?,
+    };
+    (!is_same(&farthest, &own)).then_some(farthest)
 }
 
 /// The motion that is the answer, and the runner-up.
@@ -165,7 +185,11 @@ fn answers(
     let observations = poses.observations;
     let is_few = observations.len() < MANY;
     let (motion, mut second) = match verdict.model {
-        Model::Planar => both_of_plane(poses, others, polished.motion(), verdict.is_exact_plane),
+        Model::Planar => {
+            let likeliest = conclusion.small.as_ref().and_then(SmallMotion::likeliest);
+            let best = likeliest.filter(|_| verdict.is_exact_plane).unwrap_or(*polished.motion());
+            both_of_plane(poses, others, &best, verdict.is_exact_plane)
+        }
         Model::PureRotation if conclusion.small.is_some() => (*polished.motion(), None),
         Model::PureRotation => (still(observations, &polished.pose.inliers, verdict.q_21), None),
         Model::General if is_few => (*polished.motion(), None),

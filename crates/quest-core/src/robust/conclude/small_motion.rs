@@ -3,8 +3,9 @@
 //!
 //! All of this is asked only where a rotation alone leaves little of the displacements, and of more than a few matches.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::robust::conclude::alternatives::Alternative;
 use crate::robust::conclude::depth_field::{self, DepthField, Fit};
 use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
@@ -65,7 +66,7 @@ const MOST_BY_CHANCE: usize = 5;
 
 /// The depth fields begin from so many minima. Some matches and rounds compare them; those that are left have more rounds, with
 /// all matches.
-const STARTS: usize = 5;
+const STARTS: usize = 7;
 const EXPLORED: usize = 250;
 const EXPLORING_ROUNDS: usize = 8;
 const FIELD_ROUNDS: usize = 8;
@@ -77,6 +78,9 @@ const UNLIKELY: f64 = 8.0;
 /// The second pose is a mode that is less likely by at most so many nats, a twentieth, and whose direction is so far away, 20°.
 const AS_LIKELY: f64 = 3.0;
 const OTHER: f64 = 0.35;
+
+/// A translation stands clear of its noise at this many standard deviations.
+const CLEAR: f64 = 4.0;
 
 /// Directions with a larger cosine, within 11°, are the same start.
 const SAME_DIRECTION: f64 = 0.98;
@@ -111,20 +115,52 @@ pub(crate) struct SmallMotion {
 }
 
 impl SmallMotion {
+    /// Leaves only the modes whose translations have about the direction of the likeliest: of the two motions of a plane one is the
+    /// answer and the other the second pose. Their mean would be neither.
+    pub(crate) fn without_twins(mut self) -> Self {
+        let Some(t_21) = self.modes.first().map(|mode| mode.at.t_21) else { return self };
+        self.modes.retain(|mode| mode.at.t_21.angle(&t_21) < OTHER);
+        self
+    }
+
+    /// The likeliest mode.
+    pub(crate) fn likeliest(&self) -> Option<Motion> {
+        let at = &self.modes.first()?.at;
+        Some(Motion { q_21: at.q_21, direction: at.t_21.try_normalize(f64::MIN_POSITIVE)? })
+    }
+
+    /// Whether the translation of the likeliest mode stands clear of its noise.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.modes.first().is_some_and(|mode| {
+            let block: Matrix3<f64> = mode.covariance.fixed_view::<3, 3>(3, 3).into_owned();
+            let square = block.cholesky().map(|factor| mode.at.t_21.dot(&factor.solve(&mode.at.t_21)));
+            square.is_some_and(|square| square > CLEAR * CLEAR)
+        })
+    }
+
+    /// The modes that are nearly as likely as the likeliest.
+    pub(crate) fn likely(&self) -> impl Iterator<Item = &Fit> {
+        let most = self.modes.first().map_or(0.0, |mode| mode.nats);
+        self.modes.iter().filter(move |mode| mode.nats > most - AS_LIKELY)
+    }
+
     /// Of the modes that are nearly as likely as the likeliest, the one whose direction is the farthest from a translation, if that
     /// is far.
     pub(crate) fn other_mode(&self, t_21: &Vector3<f64>) -> Option<Motion> {
-        let most = self.modes.first()?.nats;
-        let likely = self.modes.iter().filter(|mode| mode.nats > most - AS_LIKELY);
-        let away = likely.map(|mode| (mode.at.t_21.angle(t_21), mode));
+        let away = self.likely().map(|mode| (mode.at.t_21.angle(t_21), mode));
         let (angle, mode) = away.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let direction = mode.at.t_21.try_normalize(f64::MIN_POSITIVE)?;
         (angle > OTHER).then_some(Motion { q_21: mode.at.q_21, direction })
     }
 }
 
-/// Looks at a pose whose motion is small: the pose of the likeliest minimum, refined without matches that agree by chance.
-pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Option<SmallMotion>) {
+/// Looks at a pose whose motion is small: the pose of the likeliest minimum, refined without matches that agree by chance. `of_plane`
+/// are the motions of the best plane, both of which may be modes.
+pub(crate) fn look(
+    poses: &mut PoseScorer,
+    polished: Polished,
+    of_plane: &[Alternative],
+) -> (Polished, Option<SmallMotion>) {
     let observations = poses.observations;
     let sigma = polished.sigma.hypot(CALIBRATION * observations.columns.focal_length());
     let inliers = polished.pose.inliers.len();
@@ -154,6 +190,11 @@ pub(crate) fn look(poses: &mut PoseScorer, polished: Polished) -> (Polished, Opt
     let weighed = likelihood(WEIGHED);
     let Evidence { nats, mean_depth, .. } = weighed.of(polished.motion(), ROUNDS);
     minima.push(Minimum { nats: f64::INFINITY, motion: *polished.motion(), mean_depth });
+    minima.extend(of_plane.iter().map(|alternative| {
+        let motion = *alternative.motion();
+        let mean_depth = weighed.of(&motion, FEW_ROUNDS).mean_depth;
+        Minimum { nats: f64::INFINITY, motion, mean_depth }
+    }));
     let least_depth = sigma / observations.columns.focal_length();
     let mut modes = modes(&q_21, &minima, least_depth, &likelihood(EXPLORED), &weighed);
     // Where none explains the matches as well as the essential matrix does, the depths are of another kind.
