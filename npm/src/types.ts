@@ -2,7 +2,9 @@
 export interface Camera {
   model:
     | "SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "OPENCV_FISHEYE" | "FULL_OPENCV"
-    | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE";
+    | "SIMPLE_RADIAL_FISHEYE" | "RADIAL_FISHEYE"
+    | "FOV" | "THIN_PRISM_FISHEYE" | "RAD_TAN_THIN_PRISM_FISHEYE" | "SIMPLE_DIVISION" | "DIVISION"
+    | "SIMPLE_FISHEYE" | "FISHEYE" | "EUCM" | "EQUIRECTANGULAR";
   params: number[];
   width?: number;
   height?: number;

@@ -20,7 +20,8 @@ pub(crate) fn key(error: &CameraError) -> Option<&'static str> {
         CameraError::UnknownModel { .. } => Some("model"),
         CameraError::ParameterCount { .. }
         | CameraError::ParameterNotFinite { .. }
-        | CameraError::FocalLength { .. } => Some("params"),
+        | CameraError::FocalLength { .. }
+        | CameraError::ParameterRange { .. } => Some("params"),
         _ => None,
     }
 }

@@ -20,9 +20,14 @@ use crate::foreign_camera;
 ///     ``"SIMPLE_PINHOLE"`` (f, cx, cy), ``"PINHOLE"`` (fx, fy, cx, cy), ``"SIMPLE_RADIAL"`` (f, cx, cy, k),
 ///     ``"RADIAL"`` (f, cx, cy, k1, k2), ``"OPENCV"`` (fx, fy, cx, cy, k1, k2, p1, p2), ``"OPENCV_FISHEYE"``
 ///     (fx, fy, cx, cy, k1, k2, k3, k4), ``"FULL_OPENCV"`` (fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6),
-///     ``"SIMPLE_RADIAL_FISHEYE"`` (f, cx, cy, k) or ``"RADIAL_FISHEYE"`` (f, cx, cy, k1, k2).
+///     ``"SIMPLE_RADIAL_FISHEYE"`` (f, cx, cy, k), ``"RADIAL_FISHEYE"`` (f, cx, cy, k1, k2), ``"SIMPLE_FISHEYE"``
+///     (f, cx, cy), ``"FISHEYE"`` (fx, fy, cx, cy), ``"FOV"`` (fx, fy, cx, cy, omega), ``"THIN_PRISM_FISHEYE"``
+///     (fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1), ``"RAD_TAN_THIN_PRISM_FISHEYE"`` (fx, fy, cx, cy, k0, k1, k2,
+///     k3, k4, k5, p0, p1, s0, s1, s2, s3), ``"SIMPLE_DIVISION"`` (f, cx, cy, k), ``"DIVISION"`` (fx, fy, cx, cy, k),
+///     ``"EUCM"`` (fx, fy, cx, cy, alpha, beta) or ``"EQUIRECTANGULAR"`` (w, h).
 /// params : array_like of shape (P,)
-///     The model's parameters in that order: focal lengths and principal point in pixels, then the distortion.
+///     The model's parameters in that order: focal lengths and principal point in pixels, then the distortion. A panorama
+///     has its width and height in pixels.
 /// width, height : int, optional
 ///     The size of the image in pixels. Poses do not depend on it.
 ///

@@ -48,6 +48,72 @@ def test_pycolmap_and_poselib() -> None:
     assert qp.estimate(scene.u1, scene.u2, camera.todict()) == expected
 
 
+# Parameters of every model of COLMAP 4.2, with COLMAP's number of the model.
+MODELS: dict[str, tuple[int, list[float]]] = {
+    "SIMPLE_PINHOLE": (0, [300, 500, 250]),
+    "PINHOLE": (1, [300, 310, 500, 250]),
+    "SIMPLE_RADIAL": (2, [300, 500, 250, -0.05]),
+    "RADIAL": (3, [300, 500, 250, -0.05, 0.01]),
+    "OPENCV": (4, [300, 310, 500, 250, -0.05, 0.01, 1e-3, -2e-3]),
+    "OPENCV_FISHEYE": (5, [300, 310, 500, 250, -0.05, 0.01, 1e-3, -2e-4]),
+    "FULL_OPENCV": (6, [300, 310, 500, 250, -0.05, 0.01, 1e-3, -2e-3, 0.01, 0.02, 0.01, 0.005]),
+    "FOV": (7, [300, 310, 500, 250, 0.9]),
+    "SIMPLE_RADIAL_FISHEYE": (8, [300, 500, 250, -0.02]),
+    "RADIAL_FISHEYE": (9, [300, 500, 250, -0.02, 0.004]),
+    "THIN_PRISM_FISHEYE": (10, [300, 310, 500, 250, 0.03, -0.01, 0.004, -0.003, 0.002, -0.001, 0.005, -0.006]),
+    "RAD_TAN_THIN_PRISM_FISHEYE": (
+        11,
+        [300, 310, 500, 250, 0.03, -0.01, 0.004, -0.003, 0.002, -0.001, 0.005, -0.006, 0.004, -0.002, 0.003, 0.001],
+    ),
+    "SIMPLE_DIVISION": (12, [300, 500, 250, -0.1]),
+    "DIVISION": (13, [300, 310, 500, 250, 0.1]),
+    "SIMPLE_FISHEYE": (14, [300, 500, 250]),
+    "FISHEYE": (15, [300, 310, 500, 250]),
+    "EUCM": (16, [300, 310, 500, 250, 0.6, 1.1]),
+    "EQUIRECTANGULAR": (17, [1000, 500]),
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_goes_there_and_back(model: str) -> None:
+    number, params = MODELS[model]
+    camera = qp.Camera(model, params, width=1000, height=500)
+    points = np.random.default_rng(number).uniform(-0.6, 0.6, (200, 3)) + [0, 0, 1]
+    rays = camera.bearing(camera.project(points))
+    np.testing.assert_allclose(np.cross(rays, points), 0, atol=1e-12)
+    assert qp.Camera(**camera.to_dict()) == camera
+    x1 = np.random.default_rng(number).uniform([-2, -2, 4], [2, 2, 8], (60, 3))
+    R, t = rotation(np.array([0.02, -0.05, 0.03])), np.array([0.5, 0.1, 0.2])
+    u1, u2 = camera.project(x1), camera.project(x1 @ R.T + t)
+    found = qp.estimate(u1, u2, camera)
+    np.testing.assert_allclose(found.R, R, atol=1e-9)
+    np.testing.assert_allclose(found.t / np.linalg.norm(found.t), t / np.linalg.norm(t), atol=1e-8)
+    assert qp.estimate(u1, u2, {"model": number, "params": params, "width": 1000, "height": 500}) == found
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_agrees_with_pycolmap(model: str) -> None:
+    pycolmap = pytest.importorskip("pycolmap")
+    number, params = MODELS[model]
+    theirs = pycolmap.Camera(model=model, width=1000, height=500, params=params)
+    camera = qp.Camera(model, params)
+    assert int(theirs.model) == number
+    names = [name.strip() for name in theirs.params_info.split(",")]
+    with pytest.raises(qp.BadCamera, match=rf"\({', '.join(names)}\)"):
+        qp.Camera(model, [*params, 0.0])
+    points = np.random.default_rng(number).uniform(-0.6, 0.6, (200, 3)) + [0, 0, 1]
+    pixels = camera.project(points)
+    # Coordinates of 1000 pixels are rounded to 1e-13; a few operations.
+    np.testing.assert_allclose(pixels, theirs.img_from_cam(points), atol=1e-11)
+    rays = camera.bearing(pixels)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    # COLMAP's iterations end at 1e-10 on the plane.
+    np.testing.assert_allclose(rays, theirs.cam_ray_from_img(pixels), atol=1e-8)
+    everywhere = np.random.default_rng(number).uniform([-2000, -2000], [3000, 3000], (500, 2))
+    seen = camera.has_ray(everywhere)
+    assert np.isfinite(camera.bearing(everywhere[seen])).all()
+
+
 def test_opencv() -> None:
     k = np.array([[500.0, 0, 320], [0, 510, 240], [0, 0, 1]])
     assert qp.Camera.from_opencv(k) == qp.Camera.from_k(k)

@@ -89,7 +89,8 @@ fn cameras_that_are_not_understood() {
     let half = "a.json: camera1: found one of width and height, expected both or none";
     refused("a.json", file(r#"{"model": "PINHOLE", "width": 9, "params": [1, 1, 0, 0]}"#), half);
     let names = "SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV, \
-                 SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE";
+                 SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, FOV, THIN_PRISM_FISHEYE, RAD_TAN_THIN_PRISM_FISHEYE, \
+                 SIMPLE_DIVISION, DIVISION, SIMPLE_FISHEYE, FISHEYE, EUCM, EQUIRECTANGULAR";
     let unknown = format!("a.json: camera1.model: unknown camera model \"FISH\", expected one of {names}");
     refused("a.json", file(r#"{"model": "FISH", "params": [1, 1, 0, 0]}"#), &unknown);
     let count = "a.json: camera1.params: PINHOLE takes 4 parameters (fx, fy, cx, cy), found 3";

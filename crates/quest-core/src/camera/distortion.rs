@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::newton::solve;
 use super::root::{COEFFICIENTS, Polynomial, positive_up_to};
 
 /// The map `D(x) = h(r²) x + 2 (w·x) x + r² w` with `r = |x|`, `h = N/D` a quotient of polynomials and the
@@ -13,7 +14,7 @@ use super::root::{COEFFICIENTS, Polynomial, positive_up_to};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distortion {
     /// Coefficients of N in `r²`, the first one 1.
-    numerator: [f64; 5],
+    numerator: [f64; 7],
     /// Coefficients of D in `r²`, the first one 1.
     denominator: [f64; 4],
     w: Vector2<f64>,
@@ -50,6 +51,10 @@ impl Distortion {
             denominator[2 * j] = dj;
             ratio[2 * j + 1] = -4.0 * w * dj;
             for (i, ni) in self.numerator.into_iter().enumerate() {
+                // Numerators of more than four terms have the denominator 1, which keeps the degree of products below COEFFICIENTS.
+                if ni == 0.0 || dj == 0.0 {
+                    continue;
+                }
                 // D² g' = N D + 2 r² (N' D - N D').
                 slope[2 * (i + j)] += (1.0 + 2.0 * (i as f64 - j as f64)) * ni * dj;
             }
@@ -124,7 +129,9 @@ impl Distortion {
         // Close to the border, with absurd tangential distortion, steps from there may run into the border.
         // From the centre Newton's flow is the inverse of the segment from 0 to y, which for all radii up to
         // max_distorted lies in the disc.
-        self.solve(y, y * scale(start, radius)).or_else(|| self.solve(y, Vector2::zeros()))
+        let distort = |x: &Vector2<f64>| self.distort(x);
+        solve(distort, y, y * scale(start, radius), self.max_radius)
+            .or_else(|| solve(distort, y, Vector2::zeros(), self.max_radius))
     }
 
     /// Solves `g(r) = distorted` on `[0, max_radius]`, where g increases, by Newton's method. Bisects whenever a Newton
@@ -155,30 +162,6 @@ impl Distortion {
             r = next;
         }
         r
-    }
-
-    /// Solves `D(x) = y` in the disc by Newton's method from `x`. Each step is shortened until the error decreases.
-    fn solve(&self, y: &Vector2<f64>, mut x: Vector2<f64>) -> Option<Vector2<f64>> {
-        let (value, mut jacobian) = self.distort(&x);
-        let mut error = value - y;
-        // The usual number of steps is three; points near the border of the domain take up to twenty.
-        for _ in 0..60 {
-            let step = jacobian.try_inverse()? * error;
-            let settled = |tolerance: f64| step.norm() <= tolerance * x.norm();
-            if settled(4.0 * f64::EPSILON) {
-                return (x.norm() <= self.max_radius).then_some(x);
-            }
-            let shorter = (0..20).map(|k| x - step * 0.5f64.powi(k)).filter(|x| x.norm() <= self.max_radius);
-            let mut evaluated = shorter.map(|x| (x, self.distort(&x)));
-            let Some((next, (value, j))) = evaluated.find(|(_, (v, _))| (v - y).norm() < error.norm()) else {
-                // Rounding stops the descent at a tiny step, or, at a fold, at a tiny error; a point without
-                // an inverse stops at the border with an error as large as its distance from the image.
-                let solved = settled(1e-12) || error.norm() <= 1e-11 * y.norm();
-                return solved.then_some(x);
-            };
-            (x, error, jacobian) = (next, value - y, j);
-        }
-        None
     }
 }
 

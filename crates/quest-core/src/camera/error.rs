@@ -38,6 +38,16 @@ pub enum CameraError {
         /// What was found, in pixels.
         found: f64,
     },
+    /// A parameter lies outside of its range.
+    #[error("parameter {name} of the camera is {found}, expected {expected}")]
+    ParameterRange {
+        /// The parameter's name.
+        name: &'static str,
+        /// What was found.
+        found: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
     /// The image has no pixels.
     #[error("the size of the image is {width} x {height}, expected at least 1 x 1")]
     EmptyImage {
@@ -79,14 +89,22 @@ pub enum CameraError {
         /// The distorted radius up to which pixels in every direction have a viewing ray.
         limit: f64,
     },
+    /// The pixel lies outside of a panorama. Only the pixels of its image have viewing rays.
+    #[error("the pixel ({}, {}) lies outside of the panorama of {} x {} pixels", .found[0], .found[1], .size[0], .size[1])]
+    OutsidePanorama {
+        /// The pixel.
+        found: [f64; 2],
+        /// Width and height of the panorama, in pixels.
+        size: [f64; 2],
+    },
     /// A perspective camera cannot see the point, since it is not in front of it.
     #[error("the point has the depth z = {z}, expected a positive one in front of the camera")]
     BehindCamera {
         /// What was found.
         z: f64,
     },
-    /// A fisheye camera maps the point to no pixel in particular: it is the centre of projection, or lies
-    /// straight behind it, where the image is a circle.
+    /// A camera that sees behind itself maps the point to no pixel in particular. The point is the centre of projection,
+    /// or lies straight behind a fisheye camera, where the image is a circle.
     #[error("the point is the centre of projection or straight behind it, expected one with a single image")]
     NoDirection,
     /// The point lies too far from the optical axis for the model: the distortion would fold it back into

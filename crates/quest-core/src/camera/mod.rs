@@ -21,6 +21,15 @@
 //! | `SIMPLE_RADIAL_FISHEYE` | `f, cx, cy, k` | `θd = θ (1 + k θ²)` |
 //! | `RADIAL_FISHEYE` | `f, cx, cy, k1, k2` | `θd = θ (1 + k1 θ² + k2 θ⁴)` |
 //! | `OPENCV_FISHEYE` | `fx, fy, cx, cy, k1, k2, k3, k4` | `θd = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` |
+//! | `SIMPLE_FISHEYE` | `f, cx, cy` | `θd = θ` |
+//! | `FISHEYE` | `fx, fy, cx, cy` | `θd = θ` |
+//! | `THIN_PRISM_FISHEYE` | `fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1` | `h` as `OPENCV_FISHEYE`, tangential and thin prism |
+//! | `RAD_TAN_THIN_PRISM_FISHEYE` | `fx, fy, cx, cy, k0, …, k5, p0, p1, s0, …, s3` | `h` of six terms, then tangential and thin prism |
+//! | `FOV` | `fx, fy, cx, cy, omega` | `rd = atan(2 r tan(ω/2)) / ω` |
+//! | `SIMPLE_DIVISION` | `f, cx, cy, k` | `r = rd / (1 + k rd²)` |
+//! | `DIVISION` | `fx, fy, cx, cy, k` | as `SIMPLE_DIVISION` |
+//! | `EUCM` | `fx, fy, cx, cy, alpha, beta` | `rd = r / (α √(β r² + 1) + 1 - α)` |
+//! | `EQUIRECTANGULAR` | `w, h` | a panorama of the whole sphere |
 //!
 //! Perspective models, with `x = X/Z`, `y = Y/Z` and `r² = x² + y²` (Brown 1966):
 //!
@@ -32,22 +41,47 @@
 //! Fisheye models, with the angle from the optical axis `θ = atan2(√(X² + Y²), Z)` in `[0, π]` (Kannala and
 //! Brandt 2006): `(xd, yd) = θd (X, Y) / √(X² + Y²)`.
 //!
+//! The two thin prism models start from `(x, y) = θ (X, Y) / √(X² + Y²)`. With `r² = x² + y²`:
+//!
+//! ```text
+//! THIN_PRISM_FISHEYE           xd = h x + 2 p1 x y + p2 (r² + 2 x²) + sx1 r²
+//!                              yd = h y + 2 p2 x y + p1 (r² + 2 y²) + sy1 r²
+//! RAD_TAN_THIN_PRISM_FISHEYE   (x, y) is replaced by h (x, y), and r² with it; then
+//!                              xd = x + 2 p1 x y + p0 (r² + 2 x²) + s0 r² + s1 r⁴
+//!                              yd = y + 2 p0 x y + p1 (r² + 2 y²) + s2 r² + s3 r⁴
+//! ```
+//!
+//! A panorama: `u = w (a / 2π + 1/2)` with `a = atan2(X, Z)`, `v = h (e / π + 1/2)` with `e = atan2(Y, √(X² + Z²))`.
+//!
 //! # Domain
 //! Distortion polynomials fold: beyond some radius two rays meet in one pixel. A camera is used only where its map is
 //! one to one and connected to the image centre, which is up to the first radius (angle) at which the distorted
 //! radius stops growing. With tangential distortion it is used on the largest disc about the optical axis on which
 //! a bound proves that the map is invertible. Beyond it [`Camera::bearing`] and [`Camera::project`] return errors
 //! that name the radius and the limit. The plane `z = 1` ends at [`MAX_IMAGE_COORDINATE`].
+//! `FOV`, the division models and `EUCM` are used in front of the camera only, as COLMAP uses them. A panorama has rays
+//! for the pixels of its image, borders included, and for no others.
 //!
 //! # Sources
 //! - The models, their names and their order of parameters: COLMAP, `src/colmap/sensor/models.h`.
 //! - D. C. Brown, *Decentering distortion of lenses*, Photogrammetric Engineering 32(3), 444–462, 1966.
+//! - F. Devernay and O. Faugeras, *Straight lines have to be straight*, Machine Vision and Applications 13, 14–24, 2001
+//!   (`FOV`).
+//! - A. W. Fitzgibbon, *Simultaneous linear estimation of multiple view geometry and lens distortion*, CVPR 2001 (division).
+//! - B. Khomutenko, G. Garcia and P. Martinet, *An enhanced unified camera model*, IEEE RA-L 1(1), 137–144, 2016 (`EUCM`).
+//! - J. Weng, P. Cohen and M. Herniou, *Camera calibration with distortion models and accuracy evaluation*, IEEE TPAMI
+//!   14(10), 965–980, 1992 (thin prism).
 //! - J. Kannala and S. S. Brandt, *A generic camera model and calibration method for conventional,
 //!   wide-angle, and fish-eye lenses*, IEEE TPAMI 28(8), 1335–1340, 2006.
 
+mod closed_form;
 mod distortion;
 mod error;
+mod lens;
 mod model;
+mod newton;
+mod panorama;
+mod prism;
 mod root;
 #[cfg(test)]
 mod tests;
@@ -59,7 +93,8 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 pub use error::CameraError;
 pub use model::CameraModel;
 
-use distortion::{Distortion, scale};
+use distortion::scale;
+use lens::Lens;
 
 /// The largest radius on the plane `z = 1`, `1 / sqrt(f64::EPSILON)`. A viewing ray beyond it cannot be distinguished from
 /// one at a right angle to the optical axis.
@@ -69,7 +104,7 @@ pub const MAX_IMAGE_COORDINATE: f64 = 6.7e7;
 const MAX_PARAMETER: f64 = 1e30;
 
 /// The number of parameters of the largest model.
-const MAX_PARAMETERS: usize = 12;
+const MAX_PARAMETERS: usize = 16;
 
 /// A calibrated camera: pixels to viewing rays and back.
 ///
@@ -92,7 +127,7 @@ pub struct Camera {
     model: CameraModel,
     params: [f64; MAX_PARAMETERS],
     size: Option<(u32, u32)>,
-    distortion: Distortion,
+    lens: Lens,
 }
 
 impl Camera {
@@ -100,7 +135,8 @@ impl Camera {
     /// lengths and principal point in pixels, distortion coefficients without unit.
     ///
     /// # Errors
-    /// [`CameraError::ParameterCount`], [`CameraError::ParameterNotFinite`], [`CameraError::FocalLength`].
+    /// [`CameraError::ParameterCount`], [`CameraError::ParameterNotFinite`], [`CameraError::FocalLength`],
+    /// [`CameraError::ParameterRange`].
     pub fn new(model: CameraModel, params: &[f64]) -> Result<Self, CameraError> {
         let names = model.param_names();
         if params.len() != names.len() {
@@ -116,10 +152,10 @@ impl Camera {
                 return Err(CameraError::FocalLength { name, found });
             }
         }
-        let distortion = distortion(model, &params[model.focal_length_count() + 2..]);
+        let lens = Lens::new(model, params)?;
         let mut all = [0.0; MAX_PARAMETERS];
         all[..params.len()].copy_from_slice(params);
-        Ok(Self { model, params: all, size: None, distortion })
+        Ok(Self { model, params: all, size: None, lens })
     }
 
     /// The `PINHOLE` camera with the calibration matrix `k = [fx 0 cx; 0 fy cy; 0 0 1]`, in pixels.
@@ -168,56 +204,63 @@ impl Camera {
         self.size
     }
 
-    /// `(fx, fy)` in pixels.
+    /// `(fx, fy)` in pixels. A panorama has pixels a radian instead, along the equator and along a meridian.
     #[must_use]
     pub fn focal_lengths(&self) -> (f64, f64) {
-        (self.params[0], self.params[self.model.focal_length_count() - 1])
+        match self.model.focal_length_count() {
+            0 => (self.params[0] / (2.0 * PI), self.params[1] / PI),
+            count => (self.params[0], self.params[count - 1]),
+        }
     }
 
-    /// `(cx, cy)` in pixels.
+    /// `(cx, cy)` in pixels; the middle of a panorama.
     #[must_use]
     pub fn principal_point(&self) -> (f64, f64) {
-        let first = self.model.focal_length_count();
-        (self.params[first], self.params[first + 1])
+        match self.model.focal_length_count() {
+            0 => (0.5 * self.params[0], 0.5 * self.params[1]),
+            first => (self.params[first], self.params[first + 1]),
+        }
     }
 
     /// The viewing ray of a pixel `(u, v)`: `(x, y, 1)` on the plane `z = 1` for perspective models, a unit
-    /// vector for fisheye models (with `z <= 0` at 90 degrees and beyond).
+    /// vector for fisheye models and panoramas (with `z <= 0` at 90 degrees and beyond).
     ///
     /// # Errors
-    /// [`CameraError::NotFinite`], and [`CameraError::OutOfDomain`] where the model has no ray for the pixel
-    /// (see [Domain](crate::camera#domain)).
+    /// [`CameraError::NotFinite`]; [`CameraError::OutOfDomain`] and [`CameraError::OutsidePanorama`] where the model has
+    /// no ray for the pixel (see [Domain](crate::camera#domain)).
     pub fn bearing(&self, pixel: [f64; 2]) -> Result<Vector3<f64>, CameraError> {
         require_finite(&pixel)?;
         let ((fx, fy), (cx, cy)) = (self.focal_lengths(), self.principal_point());
         let distorted = Vector2::new((pixel[0] - cx) / fx, (pixel[1] - cy) / fy);
         let radius = distorted.x.hypot(distorted.y);
-        let ray = if self.model.is_fisheye() {
-            self.distortion.undistort_radius(radius).map(|angle| {
-                let (sin, cos) = angle.sin_cos();
-                (distorted * scale(sin, radius)).push(cos)
-            })
-        } else {
-            self.distortion.undistort(&distorted).map(|x| x.push(1.0))
+        let ray = match self.lens {
+            Lens::Panorama => return panorama::ray(pixel, [self.params[0], self.params[1]], &distorted),
+            _ if self.model.is_fisheye() => self.lens.undistort_angle(&distorted).map(|x| {
+                let (sin, cos) = x.angle.sin_cos();
+                (x.direction * scale(sin, x.length)).push(cos)
+            }),
+            _ => self.lens.undistort(&distorted).map(|x| x.push(1.0)),
         };
-        ray.ok_or(CameraError::OutOfDomain {
-            found: radius.min(f64::MAX),
-            limit: self.distortion.max_distorted(),
-        })
+        ray.ok_or(CameraError::OutOfDomain { found: radius.min(f64::MAX), limit: self.lens.max_distorted() })
     }
 
     /// The pixel `(u, v)` of a point in the frame of the camera, in any unit of length.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`]; [`CameraError::BehindCamera`] for a perspective model and `z <= 0`;
-    /// [`CameraError::NoDirection`] for a fisheye model and the zero vector, or a point straight behind it;
+    /// [`CameraError::NoDirection`] for a fisheye model or a panorama and the zero vector, and for a point straight behind a
+    /// fisheye camera;
     /// [`CameraError::PointOutOfDomain`] beyond the [domain](crate::camera#domain), where the pixel may belong
     /// to another ray as well.
     pub fn project(&self, x: &Vector3<f64>) -> Result<[f64; 2], CameraError> {
         require_finite(x.as_slice())?;
-        let (radius, distorted) =
-            if self.model.is_fisheye() { self.distort_angle(x)? } else { self.distort_plane(x)? };
-        let limit = self.distortion.max_radius();
+        let (radius, distorted) = match self.lens {
+            // Zero lies in every domain: a panorama sees all directions.
+            Lens::Panorama => (0.0, panorama::angles(x)?),
+            _ if self.model.is_fisheye() => self.distort_angle(x)?,
+            _ => self.distort_plane(x)?,
+        };
+        let limit = self.lens.max_radius();
         let ((fx, fy), (cx, cy)) = (self.focal_lengths(), self.principal_point());
         let pixel = [fx * distorted.x + cx, fy * distorted.y + cy];
         // The slack lets the rays of pixels on the border, which are rounded, return to them.
@@ -234,7 +277,7 @@ impl Camera {
             return Err(CameraError::BehindCamera { z: x.z });
         }
         let x = x.xy() / x.z;
-        Ok((x.x.hypot(x.y), self.distortion.distort(&x).0))
+        Ok((x.x.hypot(x.y), self.lens.distort(&x)))
     }
 
     /// The angle from the optical axis and the distorted coordinates.
@@ -246,21 +289,8 @@ impl Camera {
         let x = x / x.amax();
         let sine = x.x.hypot(x.y);
         let angle = sine.atan2(x.z);
-        Ok((angle, x.xy() * scale(self.distortion.radial(angle).0, sine)))
+        Ok((angle, self.lens.distort_angle(angle, &x.xy(), sine)))
     }
-}
-
-/// The distortion of `model` with the parameters that follow the principal point.
-fn distortion(model: CameraModel, k: &[f64]) -> Distortion {
-    let (numerator, denominator, w): (&[f64], &[f64], _) = match (model, k) {
-        (CameraModel::OpenCv, &[k1, k2, p1, p2]) => (&[k1, k2], &[], Vector2::new(p2, p1)),
-        (CameraModel::FullOpenCv, &[k1, k2, p1, p2, k3, ref denominator @ ..]) => {
-            (&[k1, k2, k3], denominator, Vector2::new(p2, p1))
-        }
-        _ => (k, &[], Vector2::zeros()),
-    };
-    let limit = if model.is_fisheye() { PI } else { MAX_IMAGE_COORDINATE };
-    Distortion::new(numerator, denominator, w, limit)
 }
 
 fn require_finite(coordinates: &[f64]) -> Result<(), CameraError> {

@@ -37,11 +37,29 @@ pub enum CameraModel {
     SimpleRadialFisheye,
     /// `RADIAL_FISHEYE`: `f, cx, cy, k1, k2`.
     RadialFisheye,
+    /// `FOV`: `fx, fy, cx, cy, omega`.
+    Fov,
+    /// `THIN_PRISM_FISHEYE`: `fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1`.
+    ThinPrismFisheye,
+    /// `RAD_TAN_THIN_PRISM_FISHEYE`: `fx, fy, cx, cy, k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3`.
+    RadTanThinPrismFisheye,
+    /// `SIMPLE_DIVISION`: `f, cx, cy, k`.
+    SimpleDivision,
+    /// `DIVISION`: `fx, fy, cx, cy, k`.
+    Division,
+    /// `SIMPLE_FISHEYE`: `f, cx, cy`.
+    SimpleFisheye,
+    /// `FISHEYE`: `fx, fy, cx, cy`.
+    Fisheye,
+    /// `EUCM`: `fx, fy, cx, cy, alpha, beta`.
+    Eucm,
+    /// `EQUIRECTANGULAR`: `w, h`, the size of the panorama.
+    Equirectangular,
 }
 
 impl CameraModel {
-    /// Every model, in COLMAP's order.
-    pub const ALL: [Self; 9] = [
+    /// Every model of COLMAP 4.2.
+    pub const ALL: [Self; 18] = [
         Self::SimplePinhole,
         Self::Pinhole,
         Self::SimpleRadial,
@@ -51,6 +69,15 @@ impl CameraModel {
         Self::FullOpenCv,
         Self::SimpleRadialFisheye,
         Self::RadialFisheye,
+        Self::Fov,
+        Self::ThinPrismFisheye,
+        Self::RadTanThinPrismFisheye,
+        Self::SimpleDivision,
+        Self::Division,
+        Self::SimpleFisheye,
+        Self::Fisheye,
+        Self::Eucm,
+        Self::Equirectangular,
     ];
 
     /// COLMAP's name, as in files: `SIMPLE_PINHOLE`.
@@ -66,6 +93,15 @@ impl CameraModel {
             Self::FullOpenCv => "FULL_OPENCV",
             Self::SimpleRadialFisheye => "SIMPLE_RADIAL_FISHEYE",
             Self::RadialFisheye => "RADIAL_FISHEYE",
+            Self::Fov => "FOV",
+            Self::ThinPrismFisheye => "THIN_PRISM_FISHEYE",
+            Self::RadTanThinPrismFisheye => "RAD_TAN_THIN_PRISM_FISHEYE",
+            Self::SimpleDivision => "SIMPLE_DIVISION",
+            Self::Division => "DIVISION",
+            Self::SimpleFisheye => "SIMPLE_FISHEYE",
+            Self::Fisheye => "FISHEYE",
+            Self::Eucm => "EUCM",
+            Self::Equirectangular => "EQUIRECTANGULAR",
         }
     }
 
@@ -80,8 +116,17 @@ impl CameraModel {
             Self::OpenCv => 4,
             Self::OpenCvFisheye => 5,
             Self::FullOpenCv => 6,
+            Self::Fov => 7,
             Self::SimpleRadialFisheye => 8,
             Self::RadialFisheye => 9,
+            Self::ThinPrismFisheye => 10,
+            Self::RadTanThinPrismFisheye => 11,
+            Self::SimpleDivision => 12,
+            Self::Division => 13,
+            Self::SimpleFisheye => 14,
+            Self::Fisheye => 15,
+            Self::Eucm => 16,
+            Self::Equirectangular => 17,
         }
     }
 
@@ -95,32 +140,65 @@ impl CameraModel {
     #[must_use]
     pub fn param_names(self) -> &'static [&'static str] {
         match self {
-            Self::SimplePinhole => &["f", "cx", "cy"],
-            Self::Pinhole => &["fx", "fy", "cx", "cy"],
-            Self::SimpleRadial | Self::SimpleRadialFisheye => &["f", "cx", "cy", "k"],
+            Self::SimplePinhole | Self::SimpleFisheye => &["f", "cx", "cy"],
+            Self::Pinhole | Self::Fisheye => &["fx", "fy", "cx", "cy"],
+            Self::SimpleRadial | Self::SimpleRadialFisheye | Self::SimpleDivision => &["f", "cx", "cy", "k"],
             Self::Radial | Self::RadialFisheye => &["f", "cx", "cy", "k1", "k2"],
             Self::OpenCv => &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"],
             Self::OpenCvFisheye => &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"],
             Self::FullOpenCv => &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"],
+            Self::Fov => &["fx", "fy", "cx", "cy", "omega"],
+            Self::ThinPrismFisheye => {
+                &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"]
+            }
+            Self::RadTanThinPrismFisheye => &[
+                "fx", "fy", "cx", "cy", "k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2",
+                "s3",
+            ],
+            Self::Division => &["fx", "fy", "cx", "cy", "k"],
+            Self::Eucm => &["fx", "fy", "cx", "cy", "alpha", "beta"],
+            Self::Equirectangular => &["w", "h"],
         }
     }
 
     /// Whether the model maps the angle from the optical axis, not its tangent, so that it can see beyond
-    /// 90 degrees.
+    /// 90 degrees. A panorama counts as one.
     #[must_use]
     pub fn is_fisheye(self) -> bool {
-        matches!(self, Self::OpenCvFisheye | Self::SimpleRadialFisheye | Self::RadialFisheye)
+        matches!(
+            self,
+            Self::OpenCvFisheye
+                | Self::SimpleRadialFisheye
+                | Self::RadialFisheye
+                | Self::ThinPrismFisheye
+                | Self::RadTanThinPrismFisheye
+                | Self::SimpleFisheye
+                | Self::Fisheye
+                | Self::Equirectangular
+        )
     }
 
-    /// How many focal lengths stand at the front of the parameters: 1 or 2.
+    /// How many focal lengths stand at the front of the parameters: 1 or 2, and none for a panorama.
     pub(super) fn focal_length_count(self) -> usize {
         match self {
             Self::SimplePinhole
             | Self::SimpleRadial
             | Self::Radial
             | Self::SimpleRadialFisheye
-            | Self::RadialFisheye => 1,
-            Self::Pinhole | Self::OpenCv | Self::OpenCvFisheye | Self::FullOpenCv => 2,
+            | Self::RadialFisheye
+            | Self::SimpleDivision
+            | Self::SimpleFisheye => 1,
+            Self::Pinhole
+            | Self::OpenCv
+            | Self::OpenCvFisheye
+            | Self::FullOpenCv
+            | Self::Fov
+            | Self::ThinPrismFisheye
+            | Self::RadTanThinPrismFisheye
+            | Self::Division
+            | Self::Fisheye
+            | Self::Eucm => 2,
+            Self::Equirectangular => 0,
         }
     }
 }
@@ -149,6 +227,7 @@ mod tests {
     fn names_are_read_back_and_agree() {
         for model in CameraModel::ALL {
             assert_eq!(model.to_string().parse(), Ok(model));
+            assert_eq!(CameraModel::from_colmap_id(model.colmap_id()), Some(model));
             let focal = model.param_names().iter().filter(|name| name.starts_with('f'));
             assert_eq!(focal.count(), model.focal_length_count());
         }

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::super::{MAX_IMAGE_COORDINATE, MAX_PARAMETER};
-use super::{Camera, CameraError, CameraModel, camera, distance};
+use super::{Camera, CameraError, CameraModel, camera, distance, polynomial};
 
 const SEED_CAMERAS: u64 = 0xca3e_0101;
 const SEED_PROPERTIES: u64 = 0xca3e_0102;
@@ -41,7 +41,7 @@ fn the_fold_of_a_fisheye_is_reported() {
     let camera = camera(CameraModel::SimpleRadialFisheye, (640, 480), &[100.0, 320.0, 240.0, -1.0 / 12.0]);
     let error = camera.project(&Vector3::new(0.0, 2.1f64.sin(), 2.1f64.cos())).unwrap_err();
     assert!(error.to_string().contains("2.1") && error.to_string().contains("radians"), "{error}");
-    assert!((camera.distortion.max_radius() - 2.0).abs() < 1e-10);
+    assert!((camera.lens.max_radius() - 2.0).abs() < 1e-10);
     assert!(camera.bearing([320.0 + 100.0 * 1.34, 240.0]).is_err());
     assert!(camera.bearing([320.0 + 100.0 * 1.33, 240.0]).unwrap().z < 0.0);
 }
@@ -78,13 +78,14 @@ fn tangential_distortion_is_inverted_in_the_whole_disc_and_nowhere_else() {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED_CAMERAS);
     for _ in 0..1000 {
         let camera = tangential(&mut rng);
-        let disc = camera.distortion.max_radius().min(5.0);
+        let distortion = polynomial(&camera);
+        let disc = distortion.max_radius().min(5.0);
         for _ in 0..50 {
             let direction = Vector2::from_fn(|_, _| rng.random_range(-1.0..1.0)).normalize();
             let x = direction * (disc * rng.random_range(0.0..0.9999));
-            let (y, jacobian) = camera.distortion.distort(&x);
+            let (y, jacobian) = distortion.distort(&x);
             assert!(jacobian.symmetric_eigenvalues().min() > 0.0, "{camera:?} {x}");
-            let found = camera.distortion.undistort(&y);
+            let found = distortion.undistort(&y);
             // The root or the residual is exact to rounding: at the fold only the residual can be (the least
             // eigenvalue falls to 1e-4 of its size), at a pole only the root.
             let error = |found: Vector2<f64>| (found - x).norm().min((jacobian * (found - x)).norm());
@@ -92,7 +93,7 @@ fn tangential_distortion_is_inverted_in_the_whole_disc_and_nowhere_else() {
 
             let pixel = y * rng.random_range(1.0..3.0);
             match camera.bearing(pixel.into()) {
-                Ok(ray) => assert!(ray.xy().norm() <= camera.distortion.max_radius()),
+                Ok(ray) => assert!(ray.xy().norm() <= distortion.max_radius()),
                 Err(CameraError::OutOfDomain { found, limit }) => {
                     assert!(found > limit, "{camera:?} {pixel} {found} {limit}");
                 }
@@ -117,7 +118,7 @@ fn a_search_that_runs_into_the_border_starts_again_from_the_centre() {
 #[test]
 fn the_disc_of_barrel_distortion_is_the_largest_possible() {
     let k = [1.0, 1.0, 0.0, 0.0, -0.3, 0.0, 0.02, -0.01];
-    let distortion = Camera::new(CameraModel::OpenCv, &k).unwrap().distortion;
+    let distortion = polynomial(&Camera::new(CameraModel::OpenCv, &k).unwrap());
     // Opposite to w = (p2, p1) the Jacobian becomes singular on the border.
     let border = Vector2::new(0.01, -0.02).normalize() * distortion.max_radius();
     assert!(distortion.distort(&border).1.determinant().abs() < 1e-9);
@@ -129,9 +130,14 @@ fn far_pixels_are_errors_that_name_the_limit() {
     for model in CameraModel::ALL {
         let mut params = vec![0.0; model.param_names().len()];
         params[..2].fill(1.0);
+        into_range(model, &mut params);
         let camera = Camera::new(model, &params).unwrap();
         for far in [1e308, -f64::MAX, 1e9] {
             let error = camera.bearing([far, 0.0]).unwrap_err();
+            if model == CameraModel::Equirectangular {
+                assert_eq!(error, CameraError::OutsidePanorama { found: [far, 0.0], size: [1.0; 2] });
+                continue;
+            }
             let CameraError::OutOfDomain { found, limit } = error else { panic!("{error:?}") };
             let expected = if model.is_fisheye() { PI } else { MAX_IMAGE_COORDINATE };
             assert!(found.is_finite() && found > limit && (limit - expected).abs() <= 1e-9 * expected);
@@ -142,6 +148,17 @@ fn far_pixels_are_errors_that_name_the_limit() {
     let camera = Camera::new(CameraModel::SimplePinhole, &[1e-10, 0.0, 0.0]).unwrap();
     let error = camera.bearing([1e308, 1e308]).unwrap_err();
     assert!(matches!(error, CameraError::OutOfDomain { found, .. } if found.is_finite()), "{error}");
+}
+
+/// Moves the parameters that have a range of their own into it.
+fn into_range(model: CameraModel, params: &mut [f64]) {
+    if let (CameraModel::Fov, [.., omega]) = (model, &mut *params) {
+        *omega = omega.clamp(-3.1, 3.1);
+    }
+    if let (CameraModel::Eucm, [.., alpha, beta]) = (model, params) {
+        *alpha = alpha.abs().min(1.0);
+        *beta = beta.abs().max(1e-30);
+    }
 }
 
 /// Any number, among them NaN, infinities and subnormal ones, or one of ordinary size.
@@ -165,7 +182,11 @@ fn check_outcome(camera: &Camera, pixel: [f64; 2], x: [f64; 3]) {
     match camera.bearing(pixel) {
         Ok(ray) => assert!(ray.iter().all(|c| c.is_finite()) && ray != Vector3::zeros()),
         Err(CameraError::OutOfDomain { found, .. }) => assert!(found.is_finite()),
-        Err(error) => assert!(matches!(error, CameraError::NotFinite { .. })),
+        Err(error) => {
+            let expected =
+                matches!(error, CameraError::NotFinite { .. } | CameraError::OutsidePanorama { .. });
+            assert!(expected, "{error}");
+        }
     }
     if let Ok(pixel) = camera.project(&x.into()) {
         assert!(pixel.iter().all(|c| c.is_finite()));
@@ -178,7 +199,7 @@ proptest! {
     #[test]
     fn nothing_panics_and_nothing_is_infinite(
         model in prop::sample::select(&CameraModel::ALL[..]),
-        params in prop::array::uniform12(number()),
+        params in prop::array::uniform16(number()),
         pixel in prop::array::uniform2(number()),
         x in prop::array::uniform3(number()),
     ) {
@@ -190,13 +211,14 @@ proptest! {
         let bounded = params.map(|p| if p.is_finite() { p.clamp(-MAX_PARAMETER, MAX_PARAMETER) } else { 0.5 });
         let mut bounded = bounded[..count].to_vec();
         bounded[..2].iter_mut().for_each(|f| *f = f.abs().max(f64::MIN_POSITIVE));
+        into_range(model, &mut bounded);
         check_outcome(&Camera::new(model, &bounded).unwrap(), pixel, x);
     }
 
     #[test]
     fn every_ray_returns_to_its_pixel(
         model in prop::sample::select(&CameraModel::ALL[..]),
-        k in prop::array::uniform8(-1.0..1.0),
+        k in prop::array::uniform12(-1.0..1.0),
         pixel in prop::array::uniform2(-3.0..3.0),
     ) {
         let mut params = vec![1.0, 1.0, 0.0, 0.0];
@@ -204,12 +226,18 @@ proptest! {
             params.remove(0);
         }
         params.extend(k);
-        let camera = Camera::new(model, &params[..model.param_names().len()]).unwrap();
+        params.truncate(model.param_names().len());
+        into_range(model, &mut params);
+        let camera = Camera::new(model, &params).unwrap();
         match camera.bearing(pixel) {
             // A residual of 1e-11 is what the inverse accepts; wild rational models cancel that many digits.
             Ok(ray) => prop_assert!(distance(camera.project(&ray).unwrap(), pixel) < 1e-10),
             Err(error) => {
-                let beyond = matches!(error, CameraError::OutOfDomain { found, limit } if found > limit);
+                let beyond = match error {
+                    CameraError::OutOfDomain { found, limit } => found > limit,
+                    CameraError::OutsidePanorama { found, .. } => found.iter().any(|x| !(0.0..=1.0).contains(x)),
+                    _ => false,
+                };
                 prop_assert!(beyond, "{error}");
             }
         }

@@ -44,7 +44,7 @@ fn rays_return_to_themselves_up_to_the_border_of_the_domain() {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED_POINTS);
     for camera in realistic() {
         // The plane is infinite for some models: 3 is 72 degrees off the axis.
-        let reach = camera.distortion.max_radius().min(if camera.model().is_fisheye() { 3.1 } else { 3.0 });
+        let reach = camera.lens.max_radius().min(if camera.model().is_fisheye() { 3.1 } else { 3.0 });
         for _ in 0..2000 {
             let r = reach * rng.random_range(0.0..0.999);
             let (sin, cos) = rng.random_range(-PI..PI).sin_cos();
