@@ -48,7 +48,8 @@ Results:
   degenerate, with a reason and without a pose. No line stops the others: one that cannot be read gets a
   record with its reason. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
   at the end; --resume goes on after the records that are there.
-  A pixel without a viewing ray is an outlier; invalid_count tells how many there are.
+  A pixel without a viewing ray is an outlier, and so is a match with a coordinate that is NaN, infinite or
+  missing (null in JSON, an empty field in CSV). invalid_count tells how many there are.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
   The same seed gives the same answer; each line of JSON Lines has random numbers of its own.
 
@@ -74,7 +75,7 @@ pub(crate) struct Arguments {
     /// The matches of view 1 with a third view. Where two poses are possible, the one that agrees with them is taken.
     #[arg(long, value_name = "FILE")]
     third: Option<PathBuf>,
-    /// What to do with a match that has no bearing, such as a pixel without a viewing ray.
+    /// What to do with a match that has no bearing: a pixel without a viewing ray, or NaN.
     #[arg(long, value_enum, default_value = "outlier")]
     invalid: Invalid,
     /// The number of threads, 0 for all of the machine's; pairs are divided among them.
@@ -227,7 +228,10 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> R
     let third = arguments.third.as_deref().map(|file| third(arguments, file)).transpose()?;
     let start = Instant::now();
     let result = match (usable.error(), arguments.invalid) {
-        (Some(error), Invalid::Raise) => return Err(pair.refuse(error).into()),
+        (Some(error), Invalid::Raise) => {
+            let gap = pair.first_gap.clone().map(ReadError::from);
+            return Err(gap.unwrap_or_else(|| pair.refuse(error)).into());
+        }
         (Some(error), Invalid::Pair) => Err(error.into()),
         _ => search(arguments, pair, &usable, &options, third.as_ref()),
     };

@@ -102,6 +102,9 @@ pub enum Fault {
     /// A field of a CSV file is not a finite number.
     #[error("found {0:?}, expected a finite number")]
     NotANumber(String),
+    /// A coordinate of a match is NaN, infinite or missing, where all of them are needed.
+    #[error("{0}")]
+    Coordinate(String),
     /// A camera is not understood.
     #[error("{0}")]
     Camera(#[from] CameraError),

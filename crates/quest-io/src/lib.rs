@@ -33,6 +33,6 @@ pub use estimate_record::{
 };
 pub use json_text::write_json;
 pub use output::{Output, WriteError};
-pub use pair::{Pair, Truth};
+pub use pair::{Gap, Pair, Truth};
 pub use read::{Format, FormatInfo, Pairs, STANDARD_INPUT, read};
 pub use record::{CandidateRecord, SolveRecord};

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use quest_core::correspondence::{self, Usable};
 use quest_core::{Camera, Correspondence, InputError, RelativePose};
 
-use crate::error::{Place, ReadError};
+use crate::error::{Fault, Place, ReadError};
 
 /// The matches of two images, with what is known of the cameras and of the true pose.
 #[derive(Clone, Debug, Default)]
@@ -13,8 +13,10 @@ pub struct Pair {
     pub name: Option<String>,
     /// The cameras of view 1 and view 2; without them `matches` are on the planes `z = 1`.
     pub cameras: Option<[Camera; 2]>,
-    /// `u1, v1, u2, v2` of each match, finite.
+    /// `u1, v1, u2, v2` of each match. A coordinate that the file gives as NaN, infinite or missing is NaN.
     pub matches: Vec<[f64; 4]>,
+    /// The first such coordinate.
+    pub first_gap: Option<Gap>,
     /// One score for each match; higher is better.
     pub scores: Option<Vec<f64>>,
     /// The true pose.
@@ -23,6 +25,21 @@ pub struct Pair {
     pub place: Place,
     /// Keys or columns that are not known, in the order of the file. They were ignored.
     pub unknown_keys: Vec<String>,
+}
+
+/// A coordinate of a match that is no finite number. An estimate takes its match for an outlier.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Where it stands.
+    pub place: Place,
+    /// What was found, and what was expected.
+    pub message: String,
+}
+
+impl From<Gap> for ReadError {
+    fn from(gap: Gap) -> Self {
+        gap.place.error(Fault::Coordinate(gap.message))
+    }
 }
 
 /// The ground truth of a pair, as far as the file has it.
@@ -38,8 +55,11 @@ impl Pair {
     /// The matches as pairs of bearings, through the cameras where there are any.
     ///
     /// # Errors
-    /// The first match that has no bearings, with its place.
+    /// The first coordinate that is no finite number, and the first match that has no bearings, with its place.
     pub fn correspondences(&self) -> Result<Vec<Correspondence>, ReadError> {
+        if let Some(gap) = &self.first_gap {
+            return Err(gap.clone().into());
+        }
         let view = |k| self.matches.iter().map(|m| [m[k], m[k + 1]]).collect::<Vec<_>>();
         let (x1, x2) = (view(0), view(2));
         let matches = match &self.cameras {

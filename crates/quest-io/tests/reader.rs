@@ -33,10 +33,13 @@ fn read_as(path: &Path, format: Option<Format>) -> Vec<Result<Pair, ReadError>> 
 }
 
 fn in_order(pair: &Pair) {
-    assert!(pair.matches.iter().flatten().all(|x| x.is_finite()));
+    let mut numbers = pair.matches.iter().flatten();
+    assert_eq!(numbers.clone().any(|x| x.is_nan()), pair.first_gap.is_some());
+    assert!(numbers.all(|x| x.is_finite() || x.is_nan()));
     assert!(pair.scores.as_ref().is_none_or(|s| s.len() == pair.matches.len()));
     assert!(pair.truth.q_21.is_none_or(|q| (q.norm() - 1.0).abs() < 1e-12));
     if let Ok(matches) = pair.correspondences() {
+        assert!(pair.first_gap.is_none());
         assert_eq!(matches.len(), pair.matches.len());
     }
 }

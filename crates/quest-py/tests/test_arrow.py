@@ -74,6 +74,23 @@ def test_partitions_change_no_bit() -> None:
     assert sum(batches, []) == found
 
 
+def test_a_nan_and_a_pixel_without_a_ray_spoil_no_pair() -> None:
+    # The fold lies at 1.7 focal lengths, beyond every pixel of the scenes.
+    barrel = {"camera1": "SIMPLE_RADIAL", "params1": [1060.0, 514.0, 384.0, -0.05]}
+    rows = [row | barrel | {"camera2": barrel["camera1"], "params2": barrel["params1"]} for row in pairs(9)]
+    clean = arrow.estimate(table(rows)).to_pylist()
+    spoiled = [row | {"x1": list(row["x1"]), "x2": list(row["x2"])} for row in rows]
+    spoiled[5]["x1"][2] = [float("nan"), 1.0]
+    spoiled[7]["x2"][3] = [1e5, 0.0]
+    found = arrow.estimate(table(spoiled)).to_pylist()
+    for k, (a, b) in enumerate(zip(clean, found, strict=True)):
+        assert k in (5, 7) or a == b
+    assert [row["invalid_count"] for row in found] == [int(k in (5, 7)) for k in range(9)]
+    assert not found[5]["inliers"][2]
+    assert not found[7]["inliers"][3]
+    assert None not in (found[5]["model"], found[7]["model"])
+
+
 def test_other_forms_go_in_as_they_are() -> None:
     pa = pytest.importorskip("pyarrow")
     rows = pairs(3)

@@ -5,6 +5,7 @@ mod bad_input;
 mod candidates;
 mod estimate;
 mod formats;
+mod lines;
 mod output;
 mod polynomials;
 mod readme;

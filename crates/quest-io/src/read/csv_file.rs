@@ -1,9 +1,11 @@
 //! CSV: the header `u1,v1,u2,v2[,score]`, one match a row.
+//!
+//! A coordinate that is NaN, infinite or an empty field makes its match one without a bearing.
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::{
-    Pair,
+    Gap, Pair,
     error::{Fault, Place, ReadError},
 };
 
@@ -39,7 +41,11 @@ pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
         }
         let mut values = [0.0; 4];
         for ((value, column), name) in values.iter_mut().zip(columns).zip(COLUMNS) {
-            *value = number(name, &row[column]).map_err(refuse)?;
+            *value = coordinate(name, &row[column]).map_err(refuse)?;
+            if value.is_nan() && pair.first_gap.is_none() {
+                let error = refuse((Some(name), Fault::NotANumber(row[column].to_owned())));
+                pair.first_gap = Some(Gap { message: error.fault.to_string(), place: error.place });
+            }
         }
         pair.matches.push(values);
         if let (Some(scores), Some(column)) = (&mut pair.scores, score) {
@@ -81,6 +87,16 @@ fn columns(header: &StringRecord) -> Option<([usize; 4], Option<usize>)> {
     match find(SCORE) {
         (score, None) => Some((columns, score)),
         _ => None,
+    }
+}
+
+/// A coordinate; NaN where it is infinite, NaN or missing. Tables write a missing number as an empty field.
+fn coordinate(column: &'static str, field: &str) -> Result<f64, Refusal> {
+    match field.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Ok(f64::NAN),
+        Err(_) if field.is_empty() => Ok(f64::NAN),
+        Err(_) => Err((Some(column), Fault::NotANumber(field.to_owned()))),
     }
 }
 

@@ -1,4 +1,6 @@
 //! JSON: one object a pair.
+//!
+//! A coordinate that is `null`, `NaN` or `Infinity` makes its match one without a bearing.
 
 use std::{fmt, marker::PhantomData};
 
@@ -9,9 +11,9 @@ use serde::{
     de::{DeserializeOwned, Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
 
-use super::json_words;
+use super::{gaps, json_words};
 use crate::{
-    Pair, Truth,
+    Gap, Pair, Truth,
     camera::{self, camera},
     error::{Fault, Place, ReadError},
 };
@@ -19,12 +21,13 @@ use crate::{
 /// How far from 1 the length of a true quaternion may be: four written decimals stay within it.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
+/// A pair with matches of the form `M`.
 #[derive(Deserialize)]
-struct PairFile {
+struct PairFile<M> {
     name: Option<String>,
     camera1: Option<Object<CameraFile>>,
     camera2: Option<Object<CameraFile>>,
-    matches: Vec<Numbers<4>>,
+    matches: Vec<M>,
     scores: Option<Vec<f64>>,
     q_21: Option<Numbers<4>>,
     t_21: Option<Numbers<3>>,
@@ -37,6 +40,9 @@ struct CameraFile {
     height: Option<u32>,
     params: Vec<f64>,
 }
+
+/// A match some of whose coordinates may be missing.
+type WithGaps = [Option<f64>; 4];
 
 /// Exactly `N` numbers. For a longer list, serde's own array reports only trailing characters.
 struct Numbers<const N: usize>([f64; N]);
@@ -97,20 +103,42 @@ impl<'de, T: DeserializeOwned> Visitor<'de> for ObjectVisitor<T> {
 
 /// The pair in `text`, which starts at the line of `place`, or at line 1 of the file if `place` has no line.
 pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
+    let error = match read::<Numbers<4>>(place, text) {
+        Ok((file, unknown_keys)) => return check(place, file, |m| m.0, unknown_keys),
+        Err(error) => error,
+    };
+    // Programs write NaN and infinities as `null`, or as words that are not JSON.
+    let Ok((file, unknown_keys)) = read::<WithGaps>(place, &gaps::as_null(text)) else { return Err(error) };
+    let pair = check(place, file, |m: WithGaps| m.map(|x| x.unwrap_or(f64::NAN)), unknown_keys)?;
+    if pair.matches.iter().flatten().all(|x| x.is_finite()) {
+        // The words stand somewhere else.
+        return Err(error);
+    }
+    let gap = Gap { message: error.fault.to_string(), place: error.place };
+    Ok(Pair { first_gap: Some(gap), ..pair })
+}
+
+/// The object in `text`, and the keys that are not known.
+fn read<M: DeserializeOwned>(place: &Place, text: &str) -> Result<(PairFile<M>, Vec<String>), ReadError> {
     let mut unknown_keys = Vec::new();
     let mut track = serde_path_to_error::Track::new();
     let mut json = serde_json::Deserializer::from_str(text);
     let tracked = serde_path_to_error::Deserializer::new(&mut json, &mut track);
-    let file: Result<Object<PairFile>, _> = serde_ignored::deserialize(tracked, |path| {
+    let file: Result<Object<PairFile<M>>, _> = serde_ignored::deserialize(tracked, |path| {
         // serde_ignored writes `camera1.?.k` for a key of an optional object.
         unknown_keys.push(path.to_string().replace(".?", ""));
     });
     let file = file.map_err(|e| json_words::error(place, text, &track.path().to_string(), &e))?;
     json.end().map_err(|e| json_words::error(place, text, ".", &e))?;
-    check(place, file.0, unknown_keys)
+    Ok((file.0, unknown_keys))
 }
 
-fn check(place: &Place, file: PairFile, unknown_keys: Vec<String>) -> Result<Pair, ReadError> {
+fn check<M>(
+    place: &Place,
+    file: PairFile<M>,
+    numbers: impl Fn(M) -> [f64; 4],
+    unknown_keys: Vec<String>,
+) -> Result<Pair, ReadError> {
     let camera1 = file.camera1.map(|c| c.0.check(place, "camera1")).transpose()?;
     let camera2 = file.camera2.map(|c| c.0.check(place, "camera2")).transpose()?;
     let cameras = match (camera1, camera2) {
@@ -127,7 +155,8 @@ fn check(place: &Place, file: PairFile, unknown_keys: Vec<String>) -> Result<Pai
     Ok(Pair {
         name: file.name,
         cameras,
-        matches: file.matches.into_iter().map(|m| m.0).collect(),
+        matches: file.matches.into_iter().map(numbers).collect(),
+        first_gap: None,
         scores: file.scores,
         truth: Truth { q_21, t_21 },
         place: place.clone(),

@@ -1,6 +1,7 @@
 //! From a path to pairs.
 
 mod csv_file;
+mod gaps;
 mod json_file;
 mod json_words;
 
