@@ -58,17 +58,17 @@ fn parts(
     let bad = |error| errors::camera(name, &error);
     let params = flat(&format!("{name}.params"), params)?;
     let camera = Camera::new(model.parse().map_err(bad)?, &params).map_err(bad)?;
-    sized(name, camera, size)
+    sized(name, &camera, size)
 }
 
 /// The camera with its size, where it has one: libraries write zero, or -1, where they have none.
-fn sized(name: &str, camera: Camera, size: [Option<Bound<'_, PyAny>>; 2]) -> PyResult<Camera> {
+fn sized(name: &str, camera: &Camera, size: [Option<Bound<'_, PyAny>>; 2]) -> PyResult<Camera> {
     let size = size.map(|side| side.and_then(|side| side.extract::<i64>().ok()));
     match size.map(|side| side.and_then(|side| u32::try_from(side).ok()).filter(|side| *side > 0)) {
         [Some(width), Some(height)] => {
             camera.with_size(width, height).map_err(|error| errors::camera(name, &error))
         }
-        _ => Ok(camera),
+        _ => Ok(*camera),
     }
 }
 
@@ -102,7 +102,7 @@ fn camera_info<'py>(
         }
     };
     let camera = opencv(name, &pinhole, &d, fisheye, None)?;
-    sized(name, camera, [get("width"), get("height")])
+    sized(name, &camera, [get("width"), get("height")])
 }
 
 /// The camera of OpenCV's coefficients, and the focal lengths and the principal point of `pinhole`.
