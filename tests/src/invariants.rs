@@ -38,6 +38,16 @@ pub fn candidates(found: &Candidates, matches: &[Correspondence]) {
     }
 }
 
+/// Candidates come best first: most points in front, then the smallest residual, of which what is below 1e-12 is rounding.
+pub fn order(found: &Candidates) {
+    for pair in found.windows(2) {
+        let smaller = pair[0].residual <= pair[1].residual.max(1e-12);
+        let in_order =
+            pair[0].in_front > pair[1].in_front || (pair[0].in_front == pair[1].in_front && smaller);
+        assert!(in_order, "{pair:?}");
+    }
+}
+
 /// A covariance is finite, symmetric, and has no negative eigenvalue but for rounding.
 pub fn covariance(c: &Matrix6<f64>) {
     assert!(c.iter().all(|x| x.is_finite()), "{c}");

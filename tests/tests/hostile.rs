@@ -1,6 +1,8 @@
 //! Matches of all kinds of degenerate scenes, with noise and focal lengths of every size: no panic, no number that is none, no
 //! covariance that is not one.
 
+use nalgebra::Vector3;
+use quest_core::Correspondence;
 use quest_core::robust::{self, Options};
 use quest_core::solver::Kinds;
 use quest_core::solver::SolverName;
@@ -31,6 +33,28 @@ fn solvers_answer_with_poses_or_none() {
         }
     }
     assert!(found > 10_000, "{found}");
+}
+
+/// Eight matches that contradict each other: descents from one solution and from its twisted partner end in different minima.
+#[test]
+fn inconsistent_matches_have_no_more_candidates_than_the_table_says() {
+    let mut largest = 0;
+    for index in 0..2_000 {
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED_HOSTILE + 2);
+        rng.set_stream(index);
+        let mut any = || Vector3::from_fn(|_, _| rng.between(-1.0, 1.0)) + Vector3::z() * 1.5;
+        let matches: Vec<_> =
+            (0..8).filter_map(|_| Correspondence::from_bearings(any().into(), any().into()).ok()).collect();
+        for solver in [SolverName::Quest, SolverName::QuestEigen, SolverName::Relinearization] {
+            for kinds in Kinds::CHOICES {
+                let found = solve(solver, kinds, &matches);
+                invariants::candidates(&found, &matches);
+                assert!(found.len() <= solver.most_candidates(kinds), "{solver:?}, {index}: {}", found.len());
+                largest = largest.max(found.len());
+            }
+        }
+    }
+    assert!(largest > 10, "{largest}");
 }
 
 #[test]

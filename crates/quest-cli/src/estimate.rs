@@ -136,8 +136,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         },
     );
     progress.finish();
-    // What was answered is kept, whatever ended the run; of one pair there is nothing.
-    if is_lines || done.is_ok() {
+    // What was answered is kept, whatever ended the run; of one pair there is nothing. Where it could not be written it ends within a
+    // line, and stays in the part.
+    let is_whole = !matches!(done, Err(Failure::Write(_)));
+    if is_whole && (is_lines || done.is_ok()) {
         writer.finish(is_lines)?;
     }
     done?;

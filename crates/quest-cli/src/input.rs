@@ -28,6 +28,9 @@ pub(crate) struct InputOptions {
     /// The format of the input [default: by the extension, else by the first characters].
     #[arg(long, value_parser = input_format_parser())]
     input_format: Option<quest_io::Format>,
+    /// The most bytes that one pair may have: what is larger, or never ends, is an error.
+    #[arg(long, value_name = "BYTES", default_value_t = quest_io::MOST_BYTES)]
+    max_input: u64,
 }
 
 /// The pairs of the input, one after the other, with the cameras of the command line.
@@ -46,7 +49,7 @@ impl InputOptions {
 
     /// Another file with the same cameras and of the same form.
     pub(crate) fn open_file(&self, file: &Path, quiet: bool) -> Result<Input<'_>, ReadError> {
-        let pairs = quest_io::read(file, self.input_format)?;
+        let pairs = quest_io::read_within(file, self.input_format, self.max_input)?;
         Ok(Input { options: self, pairs, quiet, told: HashSet::new() })
     }
 

@@ -95,6 +95,11 @@ enum Failure {
 }
 
 fn main() -> ExitCode {
+    survive_full_files();
+    if let Err(error) = quest_core::lanes::Instructions::chosen() {
+        words::say("error", &error.to_string());
+        return ExitCode::from(2);
+    }
     let result = match Arguments::parse().command {
         Command::Solve(arguments) => solve::run(&arguments),
         Command::Estimate(arguments) => estimate::run(&arguments),
@@ -118,5 +123,16 @@ fn main() -> ExitCode {
             words::say("error", &failure.to_string());
             ExitCode::from(2)
         }
+    }
+}
+
+/// A file that may grow no further (`ulimit -f`) is an error of the write, after which nothing is left behind; without a handler the
+/// signal would end the program in the middle.
+fn survive_full_files() {
+    #[cfg(unix)]
+    {
+        let flag = std::sync::Arc::default();
+        // Where the signal cannot be caught it does what it did before.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, flag);
     }
 }

@@ -76,6 +76,12 @@ pub enum Fault {
     /// It is a directory.
     #[error("found a directory, expected a file")]
     Directory,
+    /// A pair is larger than was allowed, or never ends.
+    #[error("found a pair of more than {most} bytes, expected at most as many; --max-input allows more")]
+    TooLarge {
+        /// The most bytes that were allowed.
+        most: u64,
+    },
     /// There is nothing in it.
     #[error("found an empty file, expected matches as JSON, JSON Lines or CSV")]
     Empty,

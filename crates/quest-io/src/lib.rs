@@ -34,5 +34,5 @@ pub use estimate_record::{
 pub use json_text::write_json;
 pub use output::{Output, WriteError};
 pub use pair::{Gap, Pair, Truth};
-pub use read::{Format, FormatInfo, Pairs, STANDARD_INPUT, read};
+pub use read::{Format, FormatInfo, MOST_BYTES, Pairs, STANDARD_INPUT, read, read_within};
 pub use record::{CandidateRecord, SolveRecord};

@@ -4,7 +4,10 @@
 mod bad_input;
 mod candidates;
 mod estimate;
+#[cfg(target_os = "linux")]
+mod faults;
 mod formats;
+mod instructions;
 mod lines;
 mod output;
 mod polynomials;

@@ -51,7 +51,7 @@ impl BatchSolver {
     /// A solver with the fastest instructions of this processor.
     #[must_use]
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, token: Token::best() }
+        Self { tolerance, token: Token::chosen() }
     }
 
     /// A solver with these instructions; `None` where the processor does not have them.

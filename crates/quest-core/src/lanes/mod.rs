@@ -65,7 +65,7 @@ mod stages;
 #[cfg(test)]
 mod test;
 
-pub use crate::algebra::vectors::instructions::Instructions;
+pub use crate::algebra::vectors::instructions::{Instructions, UnknownInstructions};
 pub use batch::{BatchSolver, SampleError, Tolerance};
 pub use essentials::Essentials;
 pub(crate) use score::WithLoss;

@@ -135,7 +135,7 @@ pub struct SolverInfo {
     pub name: &'static str,
     /// The smallest number of matches.
     pub min_matches: usize,
-    /// The largest number of candidates, of all kinds.
+    /// The largest number of candidates of [`Kinds::All`]; [`SolverName::most_candidates`] tells it for the other kinds.
     pub max_candidates: usize,
     /// Where the method was published.
     pub reference: &'static str,
@@ -207,6 +207,13 @@ impl SolverName {
                 ..of::<RelinearizationLiteral>(20, "Fathian et al., RAS 2018, (45) to (55) as printed")
             },
         }
+    }
+
+    /// The largest number of candidates of these kinds: a plane may add the four motions of its homography.
+    #[must_use]
+    pub fn most_candidates(self, kinds: Kinds) -> usize {
+        let all = self.info().max_candidates;
+        if kinds == Kinds::Planar { (all + 4).min(Candidates::CAPACITY) } else { all }
     }
 
     /// Solves with this solver; see [`PoseSolver::solve`].

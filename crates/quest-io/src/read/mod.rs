@@ -1,5 +1,6 @@
 //! From a path to pairs.
 
+mod bounded;
 mod csv_file;
 mod gaps;
 mod json_file;
@@ -8,6 +9,7 @@ mod json_words;
 use std::{
     fs::File,
     io::{self, BufRead, BufReader, Cursor, Read},
+    ops::Range,
     path::Path,
 };
 
@@ -15,6 +17,8 @@ use crate::{
     Pair,
     error::{Fault, Place, ReadError},
 };
+
+pub use bounded::MOST_BYTES;
 
 /// What standard input is called in messages.
 pub const STANDARD_INPUT: &str = "standard input";
@@ -81,6 +85,8 @@ pub struct Pairs {
     place: Place,
     format: Format,
     input: Box<dyn BufRead>,
+    /// The most bytes of a pair.
+    most: u64,
     /// Lines read so far.
     line: usize,
     found_any: bool,
@@ -88,11 +94,20 @@ pub struct Pairs {
 }
 
 /// Opens `path`, or standard input for `-`. Without a `format` the extension decides, and where there is none
-/// that is known, the beginning of the text.
+/// that is known, the beginning of the text. A pair may have [`MOST_BYTES`].
 ///
 /// # Errors
 /// A file that is missing, unreadable, a directory, or empty where its beginning is needed.
 pub fn read(path: &Path, format: Option<Format>) -> Result<Pairs, ReadError> {
+    read_within(path, format, MOST_BYTES)
+}
+
+/// As [`read`], for pairs of at most so many bytes. One of more is an error after which there are no more pairs: what follows may
+/// never end.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_within(path: &Path, format: Option<Format>, most: u64) -> Result<Pairs, ReadError> {
     let place = if path == Path::new("-") {
         Place::file(STANDARD_INPUT)
     } else {
@@ -102,11 +117,11 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Pairs, ReadError> {
     let format = if let Some(format) = format.or_else(|| Format::from_extension(path)) {
         format
     } else {
-        let (format, start) = sniff(&mut input).map_err(|e| place.clone().error(e))?;
+        let (format, start) = sniff(&mut input, most).map_err(|e| place.clone().error(e))?;
         input = Box::new(Cursor::new(start).chain(input));
         format
     };
-    Ok(Pairs { place, format, input, line: 0, found_any: false, done: false })
+    Ok(Pairs { place, format, input, most, line: 0, found_any: false, done: false })
 }
 
 fn open(path: &Path) -> Result<Box<dyn BufRead>, Fault> {
@@ -120,28 +135,29 @@ fn open(path: &Path) -> Result<Box<dyn BufRead>, Fault> {
 }
 
 /// The form that the beginning of the text has, and the beginning, which was taken from `input`.
-fn sniff(input: &mut dyn BufRead) -> io::Result<(Format, Vec<u8>)> {
+fn sniff(input: &mut dyn BufRead, most: u64) -> Result<(Format, Vec<u8>), Fault> {
     let mut text = Vec::new();
-    let first = next_line(input, &mut text)?;
-    let is_json = matches!(first.first(), Some(b'{' | b'['));
-    let is_whole = serde_json::from_slice::<serde::de::IgnoredAny>(&first).is_ok();
+    let first = next_line(input, most, &mut text)?;
+    let is_json = matches!(text.get(first.start), Some(b'{' | b'['));
+    let is_whole = serde_json::from_slice::<serde::de::IgnoredAny>(&text[first]).is_ok();
     let format = match (is_json, is_whole) {
         (false, _) => Format::Csv,
-        (true, true) if !next_line(input, &mut text)?.is_empty() => Format::JsonLines,
+        (true, true) if !next_line(input, most, &mut text)?.is_empty() => Format::JsonLines,
         (true, _) => Format::Json,
     };
     Ok((format, text))
 }
 
-/// The next line that is not blank, trimmed; all that was read is appended to `text`.
-fn next_line(input: &mut dyn BufRead, text: &mut Vec<u8>) -> io::Result<Vec<u8>> {
+/// Where in `text`, to which all that is read is appended, the next line is that is not blank, trimmed; empty at the end.
+fn next_line(input: &mut dyn BufRead, most: u64, text: &mut Vec<u8>) -> Result<Range<usize>, Fault> {
     loop {
-        let mut line = Vec::new();
-        let end = input.read_until(b'\n', &mut line)? == 0;
-        text.extend_from_slice(&line);
-        let line = without_mark(&line).trim_ascii();
-        if end || !line.is_empty() {
-            return Ok(line.to_vec());
+        let before = text.len();
+        let is_end = bounded::line(input, most, text)? == 0;
+        let line = without_mark(&text[before..]);
+        let start = text.len() - line.trim_ascii_start().len();
+        let length = line.trim_ascii().len();
+        if is_end || length > 0 {
+            return Ok(start..start + length);
         }
     }
 }
@@ -160,7 +176,7 @@ impl Pairs {
 
     fn whole(&mut self) -> Result<Pair, ReadError> {
         let mut bytes = Vec::new();
-        self.input.read_to_end(&mut bytes).map_err(|e| self.place.clone().error(e))?;
+        bounded::all(&mut *self.input, self.most, &mut bytes).map_err(|e| self.place.clone().error(e))?;
         let text = utf8(&self.place, &bytes)?;
         if text.trim().is_empty() {
             return Err(self.place.clone().error(Fault::Empty));
@@ -175,8 +191,12 @@ impl Pairs {
     fn one_line(&mut self) -> Option<Result<Pair, ReadError>> {
         loop {
             let mut bytes = Vec::new();
-            match self.input.read_until(b'\n', &mut bytes) {
-                Err(error) => return Some(Err(self.place.clone().error(error))),
+            match bounded::line(&mut *self.input, self.most, &mut bytes) {
+                Err(fault) => {
+                    // Not as a line of the place: after that the next line would follow.
+                    let place = self.place.at_key(format!("line {}", self.line + 1));
+                    return Some(Err(place.error(fault)));
+                }
                 Ok(0) if !self.found_any => return Some(Err(self.place.clone().error(Fault::Empty))),
                 Ok(0) => return None,
                 Ok(_) => self.line += 1,

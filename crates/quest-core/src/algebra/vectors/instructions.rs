@@ -1,5 +1,8 @@
 //! Which vector instructions are used, and how a task is run with them.
 
+use std::ffi::OsStr;
+use std::sync::OnceLock;
+
 #[cfg(target_arch = "x86_64")]
 use pulp::{
     Simd, WithSimd,
@@ -33,6 +36,34 @@ impl Instructions {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Portable, Self::Sse2, Self::Avx2, Self::Avx512];
 
+    /// The environment variable that names the instructions to be used instead of the fastest, so that the answers of another
+    /// processor can be had on this one. It is read once.
+    pub const VARIABLE: &'static str = "QUEST_INSTRUCTIONS";
+
+    /// Its name in [`VARIABLE`](Self::VARIABLE).
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Sse2 => "sse2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+
+    /// Those that [`VARIABLE`](Self::VARIABLE) names; the fastest where it is not set.
+    ///
+    /// # Errors
+    /// [`UnknownInstructions`] where it names none that this processor has. What cannot tell of errors uses the fastest then.
+    pub fn chosen() -> Result<Self, UnknownInstructions> {
+        static CHOSEN: OnceLock<Result<Instructions, UnknownInstructions>> = OnceLock::new();
+        CHOSEN
+            .get_or_init(|| {
+                std::env::var_os(Self::VARIABLE).map_or_else(|| Ok(Self::best()), |found| named(&found))
+            })
+            .clone()
+    }
+
     /// The fastest that this processor has.
     #[must_use]
     pub fn best() -> Self {
@@ -47,9 +78,28 @@ impl Instructions {
 }
 
 impl Default for Instructions {
+    /// Those that were [chosen](Self::chosen), or the fastest.
     fn default() -> Self {
-        Self::best()
+        Self::chosen().unwrap_or_else(|_| Self::best())
     }
+}
+
+/// [`Instructions::VARIABLE`] names no instructions that this processor has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{} is {found:?}, expected one of {}", Instructions::VARIABLE, available())]
+pub struct UnknownInstructions {
+    /// What it is.
+    pub found: String,
+}
+
+fn named(found: &OsStr) -> Result<Instructions, UnknownInstructions> {
+    let named = Instructions::ALL.into_iter().find(|i| i.is_available() && found == i.name());
+    named.ok_or_else(|| UnknownInstructions { found: found.to_string_lossy().into_owned() })
+}
+
+fn available() -> String {
+    let names = Instructions::ALL.into_iter().filter(|i| i.is_available()).map(Instructions::name);
+    names.collect::<Vec<_>>().join(", ")
 }
 
 /// Work that can be done with any lanes. What it calls has to be inlined: a function of its own would be compiled
@@ -91,9 +141,9 @@ impl Token {
         }
     }
 
-    /// That of the fastest instructions.
-    pub(crate) fn best() -> Self {
-        Self::new(Instructions::best()).unwrap_or(Self::Portable)
+    /// That of the instructions that were chosen, or of the fastest.
+    pub(crate) fn chosen() -> Self {
+        Self::new(Instructions::default()).unwrap_or(Self::Portable)
     }
 
     /// Runs a task.

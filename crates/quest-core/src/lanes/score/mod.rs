@@ -63,7 +63,7 @@ impl Scorer {
     /// A scorer with the fastest instructions of this processor.
     #[must_use]
     pub fn new() -> Self {
-        Self { token: Token::best() }
+        Self { token: Token::chosen() }
     }
 
     /// A scorer with these instructions; `None` where the processor does not have them.

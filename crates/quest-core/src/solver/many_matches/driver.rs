@@ -30,6 +30,10 @@ pub(crate) const MIN_MATCHES: usize = 5;
 /// parallax, comes so close in one of fifty cases; five general points, to which a plane is an accident, in one of ten.
 const FLAT: f64 = 0.1;
 
+/// As many essential matrices as five matches have. The descents from one solution and from its twisted partner, or from the real
+/// part of a complex one, may end in minima of their own where the matches contradict each other, and make more of them.
+const MOST_ESSENTIALS: usize = 10;
+
 /// Fills `out` with the motions that the solver finds for five matches, or with the local minima that are reached from its
 /// `starts` for more, and with the rotation alone; what cannot be solved is answered with its reason.
 ///
@@ -84,8 +88,10 @@ fn solve_many(
     let (mut minima, smallest) = starts(&gram, &basis).refined(&gram, matches);
     // No match is far off where even their sum is small.
     if smallest > matches.len() as f64 * consensus::AGREEMENT.powi(2) {
+        minima.keep_best(MOST_ESSENTIALS - 1, &gram);
         consensus::add(&mut minima, matches);
     }
+    minima.keep_best(MOST_ESSENTIALS, &gram);
     write(kinds, &mut minima, &gram.alignment, |q0_21| gram.direction(q0_21), matches, out);
 }
 

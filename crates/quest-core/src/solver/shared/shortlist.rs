@@ -223,6 +223,17 @@ impl Shortlist {
         (minima, smallest)
     }
 
+    /// Drops all but so many, those with the smallest costs.
+    pub(crate) fn keep_best(&mut self, most: usize, gram: &Gram) {
+        while self.len > most {
+            let costs = self.iter().map(|item| gram.cost(&item.motion));
+            let worst = costs.enumerate().max_by(|(_, x), (_, y)| x.total_cmp(y));
+            let Some((worst, _)) = worst else { return };
+            self.items.copy_within(worst + 1..self.len, worst);
+            self.len -= 1;
+        }
+    }
+
     /// Those whose costs are not too far above the smallest, the best first.
     ///
     /// With noise of unknown size the logarithm of the likelihood is `−n/2 ln(cost)`, with `n` matches beyond the five that
