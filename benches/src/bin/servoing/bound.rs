@@ -1,15 +1,17 @@
 //! Where a run would end that knew everything but the noise of the goal image.
 
-use nalgebra::{Matrix2x6, Matrix6, Vector2, Vector6};
-use quest_core::servo::{FilterOptions, World};
+use nalgebra::{Matrix2x6, Matrix6, Vector2, Vector3, Vector6};
+use quest_core::servo::FilterOptions;
 
 /// The pose at which the goal's noisy image was taken, relative to the true one, as a resection finds it that knows the features'
 /// places exactly: a rotation in radians, then metres.
 ///
 /// No later image tells anything about this noise, so that no loop can end closer but by chance. Linear in the noise, which is the
-/// least squares solution to first order; where the robot's plane is known it counts as the filter counts it.
+/// least squares solution to first order; where the robot's plane is known it counts as the filter counts it. `takes` chooses the
+/// features, of which `points` are the places in metres.
 pub(crate) fn resection(
-    world: &World,
+    points: &[Vector3<f64>],
+    takes: impl Fn(usize) -> bool,
     goal: &[[f64; 2]],
     options: &FilterOptions,
     unit: f64,
@@ -22,7 +24,10 @@ pub(crate) fn resection(
         normal[(2, 2)] = normal[(0, 0)];
         normal[(4, 4)] = (plane.height * unit).powi(-2);
     }
-    for (x, seen) in world.points.iter().zip(goal) {
+    for (i, (x, seen)) in points.iter().zip(goal).enumerate() {
+        if !takes(i) {
+            continue;
+        }
         let (u, v, rho) = (x.x / x.z, x.y / x.z, 1.0 / x.z);
         // x moves by w × x + t.
         #[rustfmt::skip]

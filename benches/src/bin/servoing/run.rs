@@ -103,7 +103,8 @@ impl Cell {
             min_features: if self.plane && self.count < 20 { 4 } else { 5 },
             ..world.filter_options(&LIMITS, UNIT)
         };
-        let (position, angle) = bound::error(&bound::resection(world, &goal, &options, UNIT));
+        let (position, angle) =
+            bound::error(&bound::resection(&world.points, |_| true, &goal, &options, UNIT));
         let outcome = match self.method {
             Method::Filter => {
                 let mut filter = DepthFilter::new(&goal, SolverName::Quest, options);

@@ -1,6 +1,7 @@
 //! The closed loop.
 
 mod hostile;
+mod laboratory;
 
 use super::*;
 use crate::servo::simulation::scenario::{self, Features};

@@ -19,14 +19,14 @@ use run::Outcome;
 /// Runs the cells whose name contains `filter`, and prints the table.
 pub(crate) fn print_table(starts: u64, seed: u64, filter: &str, threads: usize, filtered: bool, lost: usize) {
     println!(
-        "| cell | starts | arrives | resection | astray | never starts | holds at the end | cm, median | 98 % | °, median | 98 % | furthest beyond the start, 98 %, cm | restarts a run | largest step, m/s | unsafe |"
+        "| cell | starts | arrives | resection | six right | arrives of them | astray | never starts | holds at the end | cm, median | 98 % | °, median | 98 % | furthest beyond the start, 98 %, cm | restarts a run | largest step, m/s | unsafe |"
     );
-    println!("|---|{}", "---:|".repeat(14));
+    println!("|---|{}", "---:|".repeat(16));
     for cell in cells().iter().filter(|cell| cell.name.contains(filter)) {
         let starts = cell.starts(starts);
         let run = |index| Ok::<_, Infallible>(run::run(cell, seed, index, filtered));
         let Ok(outcomes) = parallel::map(starts, threads, run);
-        print_row(&cell.name, &outcomes);
+        print_row(&cell.name, cell.count, &outcomes);
         let lost_ones = outcomes.iter().enumerate().filter(|(_, o)| !o.arrives() || o.is_astray());
         for (index, outcome) in lost_ones.take(lost) {
             println!("  {index}: {outcome:?}");
@@ -77,17 +77,20 @@ fn line(record: &Record) -> String {
     )
 }
 
-fn print_row(name: &str, outcomes: &[Outcome]) {
+fn print_row(name: &str, count: usize, outcomes: &[Outcome]) {
     let share = |is: &dyn Fn(&Outcome) -> bool| {
         100.0 * outcomes.iter().filter(|o| is(o)).count() as f64 / outcomes.len() as f64
     };
+    let six_right = outcomes.iter().filter(|o| o.right >= 6.min(count));
     let numbers = |of: &dyn Fn(&Outcome) -> f64| sorted(outcomes.iter().map(of));
     let (cm, degrees) = (numbers(&|o| 100.0 * o.position), numbers(&|o| o.angle));
     println!(
-        "| {name} | {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {} |",
+        "| {name} | {} | {:.1} % | {:.1} % | {} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {} |",
         outcomes.len(),
         share(&Outcome::arrives),
         share(&|o| o.resection_arrives),
+        six_right.clone().count(),
+        100.0 * six_right.clone().filter(|o| o.arrives()).count() as f64 / six_right.count().max(1) as f64,
         share(&Outcome::is_astray),
         share(&|o| !o.has_started),
         share(&|o| o.holds),

@@ -25,8 +25,11 @@ pub(crate) struct Outcome {
     /// In metres and degrees.
     pub(crate) position: f64,
     pub(crate) angle: f64,
-    /// Whether a resection from the goal image alone, the features' places being known, is within 2 cm and 1°.
+    /// Whether a resection from the goal image alone, the places of the features being known that the first image shows right, is
+    /// within 2 cm and 1°.
     pub(crate) resection_arrives: bool,
+    /// How many features the first image shows right.
+    pub(crate) right: usize,
     /// How far beyond the start's distance it ever was, in metres, less what it may explore.
     pub(crate) beyond: f64,
     pub(crate) has_started: bool,
@@ -79,7 +82,6 @@ pub(crate) fn run_watched(
     let (world, body) = scenes::draw(cell, rng);
     let goal = world.on_plane(&world.goal_pixels(rng));
     let options = world.filter_options(&LIMITS, UNIT);
-    let (position, angle) = bound::error(&bound::resection(&world, &goal, &options, UNIT));
     let mut setup = Setup {
         cell,
         world: &world,
@@ -89,7 +91,7 @@ pub(crate) fn run_watched(
         rig: Rig { unit: UNIT, ..Rig::default() },
         filtered,
     };
-    let outcome = match body {
+    match body {
         Body::Camera(_) => {
             let law = FreeCameraLaw { rate: 0.5, unit: UNIT };
             start(&setup, body, law, rng, watch)
@@ -102,8 +104,17 @@ pub(crate) fn run_watched(
             setup.options.base = RelativePose::new(base.q_21, base.t_21 / UNIT);
             start(&setup, body, DifferentialDriveLaw::default(), rng, watch)
         }
+    }
+}
+
+/// Which features an image shows where they are, within four standard deviations.
+fn right_ones(world: &World, record: &Record) -> Vec<bool> {
+    const NEAR_PX: f64 = 2.0;
+    let is_right = |(x, seen): (&nalgebra::Vector3<f64>, &Option<[f64; 2]>)| {
+        let truth = world.camera.project(&(record.truth.q_21 * x + record.truth.t_21)).ok();
+        seen.zip(truth).is_some_and(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < NEAR_PX)
     };
-    Outcome { resection_arrives: position < 0.02 && angle < 1.0, ..outcome }
+    world.points.iter().zip(&record.pixels).map(is_right).collect()
 }
 
 fn start<L: ControlLaw>(
@@ -120,28 +131,29 @@ fn start<L: ControlLaw>(
         if cell.known_depths {
             filter.set_depths(&depths, 0.02);
         }
-        return drive(cell, world, body, Servo::new(goal, filter, law, safety).with_rig(rig), rng, watch);
+        return drive(setup, body, Servo::new(goal, filter, law, safety).with_rig(rig), rng, watch);
     }
     let mut tracker = Tracker::new(goal, SolverName::Quest, options);
     if cell.known_depths {
         tracker.set_depths(&depths, 0.02);
     }
-    drive(cell, world, body, Servo::new(goal, tracker, law, safety).with_rig(rig), rng, watch)
+    drive(setup, body, Servo::new(goal, tracker, law, safety).with_rig(rig), rng, watch)
 }
 
 fn drive<E: PoseEstimator, L: ControlLaw>(
-    cell: &Cell,
-    world: &World,
+    setup: &Setup<'_>,
     mut body: Body,
     mut servo: Servo<E, L>,
     rng: &mut ChaCha8Rng,
     mut watch: impl FnMut(&Record),
 ) -> Outcome {
+    let Setup { cell, world, .. } = *setup;
     let begin = body.off().0;
     let mut outcome = Outcome {
         position: begin,
         angle: 0.0,
         resection_arrives: false,
+        right: 0,
         beyond: f64::NEG_INFINITY,
         has_started: false,
         holds: false,
@@ -155,6 +167,15 @@ fn drive<E: PoseEstimator, L: ControlLaw>(
     world.run(&mut body, &mut servo, IMAGES, rng, |record| {
         watch(record);
         let step = &record.step;
+        if step.status.images == 1 {
+            let right = right_ones(world, record);
+            outcome.right = right.iter().filter(|r| **r).count();
+            // Without wrong matches features count that come into view later, too.
+            let takes = |i: usize| cell.sticky.is_none() || right[i];
+            let bound = bound::resection(&world.points, takes, setup.goal, &setup.options, UNIT);
+            let (position, angle) = bound::error(&bound);
+            outcome.resection_arrives = position < 0.02 && angle < 1.0;
+        }
         let is_safe = step.command.is_finite()
             && step.command.linear.norm() <= LIMITS.speed * (1.0 + 1e-12)
             && step.command.angular.norm() <= LIMITS.turn_rate * (1.0 + 1e-12);

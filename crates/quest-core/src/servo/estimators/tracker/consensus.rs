@@ -10,10 +10,29 @@ use crate::servo::estimators::source::PoseSource;
 use crate::solver::{Kinds, SolverName};
 use crate::{Candidates, Correspondence, RelativePose};
 
-/// So many different poses are kept.
-pub(crate) const KEPT: usize = 4;
-/// Samples: with eight right matches of twelve a sample is right in 7 %, so that 128 miss in one of ten thousand starts.
-pub(crate) const SAMPLES: usize = 128;
+/// Below so many features all candidates are tried, not those of the consensus alone.
+pub(crate) const FEW: usize = 25;
+/// So many different poses are kept of few matches, where poses that explain six of twelve by chance are common, and of many.
+pub(crate) const KEPT: usize = 12;
+const KEPT_OF_MANY: usize = 4;
+/// Samples at least, and at most: with six right matches of twelve one sample of 132 is right, so that 1,024 miss in one of 2,000 starts.
+const FEWEST_SAMPLES: usize = 64;
+const MOST_SAMPLES: usize = 1_024;
+/// How much the inverse depths of right matches differ, as a share of their mean.
+const SPREAD: f64 = 0.3;
+/// How often a right sample may be missed.
+const MISSED: f64 = 1e-3;
+/// A squared Sampson error above this, in units of the noise, counts as wrong: three standard deviations.
+const AGREES: f64 = 9.0;
+
+/// A pose with what the matches say of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scored {
+    pub(crate) pose: RelativePose,
+    score: f64,
+    /// How many matches agree with it.
+    agree: usize,
+}
 
 /// The best poses so far.
 #[derive(Clone, Debug)]
@@ -21,11 +40,13 @@ pub(crate) struct Consensus {
     pub(crate) matches: Vec<Correspondence>,
     /// Which feature each match is.
     pub(crate) features: Vec<usize>,
-    pub(crate) best: [Option<(f64, RelativePose)>; KEPT],
+    pub(crate) best: [Option<Scored>; KEPT],
     sample: Vec<Correspondence>,
     pub(crate) candidates: Candidates,
     /// Samples drawn.
     pub(crate) drawn: usize,
+    /// The inverse depths of the pose that is scored.
+    inverse_depths: Vec<f64>,
 }
 
 impl Consensus {
@@ -37,6 +58,7 @@ impl Consensus {
             sample: Vec::with_capacity(features.max(16)),
             candidates: Candidates::new(),
             drawn: 0,
+            inverse_depths: Vec::with_capacity(features.min(FEW)),
         }
     }
 
@@ -101,10 +123,19 @@ impl Consensus {
         sigma: f64,
     ) -> &Candidates {
         self.sample.clear();
-        let best = self.best[0].map(|(_, pose)| pose);
+        let best = self.best[0].map(|best| best.pose);
         let explains =
-            |m: &Correspondence| best.is_none_or(|pose| (pose.sampson_error(m) / sigma).powi(2) < 9.0);
+            |m: &Correspondence| best.is_none_or(|pose| (pose.sampson_error(m) / sigma).powi(2) < AGREES);
         self.sample.extend(self.matches.iter().filter(|m| explains(m)));
+        if !planar && self.sample.len() > FEW {
+            // A solver's matrix grows with the pairs of matches: with a hundred it takes milliseconds. These are spread over the goal.
+            let stride = self.sample.len().div_ceil(FEW);
+            let mut k = 0;
+            self.sample.retain(|_| {
+                k += 1;
+                (k - 1) % stride == 0
+            });
+        }
         self.candidates.clear();
         if planar {
             if self.sample.len() >= SolverName::Homography.info().min_matches {
@@ -116,29 +147,84 @@ impl Consensus {
         &self.candidates
     }
 
+    /// How many samples it takes until one of right matches alone is among them, by the matches that the best pose explains.
+    pub(crate) fn wanted(&self, size: usize) -> usize {
+        let n = self.matches.len();
+        let subsets = (0..size.min(n)).fold(1, |count, i| count * (n - i) / (i + 1));
+        // Drawn with replacement: three times as many leave out one of twenty.
+        let most = (3 * subsets).min(MOST_SAMPLES);
+        let Some(Scored { agree, .. }) = self.best[0] else { return most };
+        let share = |i: usize| agree.saturating_sub(i) as f64 / n.saturating_sub(i).max(1) as f64;
+        let wrong = 1.0 - (0..size).map(share).product::<f64>();
+        let (mut missed, mut wanted) = (1.0, 0);
+        while missed > MISSED && wanted < most {
+            (missed, wanted) = (missed * wrong, wanted + 1);
+        }
+        wanted.max(FEWEST_SAMPLES).min(most)
+    }
+
     /// Takes a pose in among the best, unless it is one of them.
     pub(crate) fn offer(&mut self, pose: RelativePose, sigma: f64) {
-        let worst = self.best[KEPT - 1].map_or(f64::INFINITY, |(score, _)| score);
-        let mut score = 0.0;
+        let last = if self.matches.len() < FEW { KEPT } else { KEPT_OF_MANY } - 1;
+        let worst = self.best[last].map_or(f64::INFINITY, |scored| scored.score);
+        let (mut score, mut agree) = (0.0, 0);
         for m in &self.matches {
-            score += (pose.sampson_error(m) / sigma).powi(2).min(9.0);
+            let square = (pose.sampson_error(m) / sigma).powi(2);
+            score += square.min(AGREES);
+            agree += usize::from(square < AGREES);
             if score >= worst {
+                return;
+            }
+        }
+        let mut new = Scored { pose, score, agree };
+        if self.matches.len() < FEW {
+            new = self.with_depths(&pose, sigma);
+            if new.score >= worst || new.score.is_nan() {
                 return;
             }
         }
         let same = |p: &RelativePose| {
             p.rotation_error(&pose) < 2e-2 && p.translation_error(&pose).is_none_or(|angle| angle < 0.1)
         };
-        if let Some(known) = self.best.iter_mut().flatten().find(|(_, p)| same(p)) {
-            if score < known.0 {
-                *known = (score, pose);
+        if let Some(known) = self.best.iter_mut().flatten().find(|scored| same(&scored.pose)) {
+            if new.score < known.score {
+                *known = new;
             }
         } else {
-            self.best[KEPT - 1] = Some((score, pose));
+            self.best[last] = Some(new);
         }
-        self.best.sort_by(|a, b| {
-            let score = |x: &Option<(f64, RelativePose)>| x.map_or(f64::INFINITY, |(s, _)| s);
-            score(a).total_cmp(&score(b))
-        });
+        let score = |x: &Option<Scored>| x.map_or(f64::INFINITY, |scored| scored.score);
+        self.best.sort_by(|a, b| score(a).total_cmp(&score(b)));
+    }
+
+    /// The score of a pose with what the depths say: those of a match that agrees are positive and near their mean.
+    ///
+    /// Five of twelve matches have tens of candidates, and two more lie on the epipolar lines of every hundredth by chance: of 142
+    /// samples tens explain seven of twelve, as many as the truth does where five are wrong. Their depths are anything.
+    fn with_depths(&mut self, pose: &RelativePose, sigma: f64) -> Scored {
+        let inverse = &mut self.inverse_depths;
+        inverse.clear();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for m in &self.matches {
+            let square = (pose.sampson_error(m) / sigma).powi(2);
+            let depths = pose.depths(m).filter(|(z1, z2)| square < AGREES && *z1 > 0.0 && *z2 > 0.0);
+            let rho = depths.map_or(f64::NAN, |(z1, _)| 1.0 / z1);
+            if rho.is_finite() {
+                (sum, count) = (sum + rho, count + 1.0);
+            }
+            inverse.push(rho);
+        }
+        let mean = sum / count;
+        // A start is within about the features' depth of its goal, and a radian.
+        let mut score = pose.q_21.angle().powi(2) + (pose.t_21 * mean).norm_squared();
+        let mut agree = 0;
+        for (m, rho) in self.matches.iter().zip(&*inverse) {
+            let square = (pose.sampson_error(m) / sigma).powi(2) + ((rho / mean - 1.0) / SPREAD).powi(2);
+            // Not a number counts as wrong.
+            let agrees = square < AGREES;
+            score += if agrees { square } else { AGREES };
+            agree += usize::from(agrees);
+        }
+        Scored { pose: *pose, score, agree }
     }
 }

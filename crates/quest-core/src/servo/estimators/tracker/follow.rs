@@ -111,6 +111,7 @@ impl<S: PoseSource> Tracker<S> {
             h.score += if moves { more } else { STANDING_WEIGHT * more };
         }
         alive.sort_by(|a, b| a.score.total_cmp(&b.score));
+        drop_twice(alive);
         let best = alive[0].score;
         self.count = alive.iter().take_while(|h| h.score - best < HOPELESS).count();
         self.hypotheses[..self.count].iter_mut().for_each(|h| h.score -= best);
@@ -254,6 +255,22 @@ impl<S: PoseSource> Tracker<S> {
             return Err(HoldReason::Starting);
         }
         Ok(())
+    }
+}
+
+/// Sends hypotheses to the end that have become one with a better one.
+fn drop_twice(alive: &mut [Hypothesis]) {
+    let mut count = alive.len();
+    let mut k = 1;
+    while k < count {
+        let is_twice = alive[..k].iter().any(|h| h.is_one_with(&alive[k]));
+        if is_twice {
+            alive[k].score = f64::INFINITY;
+            alive[k..count].rotate_left(1);
+            count -= 1;
+        } else {
+            k += 1;
+        }
     }
 }
 

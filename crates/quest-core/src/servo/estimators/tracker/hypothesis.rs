@@ -49,6 +49,18 @@ impl Hypothesis {
         self.pose.rotation_error(&other.pose) < 3e-3 && (self.pose.t_21 - other.pose.t_21).norm() < 1e-2
     }
 
+    /// Whether two hypotheses have come to the same answer: of one class, and all key images at one place.
+    pub(crate) fn is_one_with(&self, other: &Self) -> bool {
+        let same = |a: &RelativePose, b: &RelativePose| {
+            a.rotation_error(b) < 1e-3 && (a.t_21 - b.t_21).norm() < 1e-3
+        };
+        let (a, b) = (&self.map, &other.map);
+        a.is_planar() == b.is_planar()
+            && a.keys.len() == b.keys.len()
+            && a.keys.iter().zip(&b.keys).all(|(a, b)| same(a, b))
+            && self.fit.zip(other.fit).is_some_and(|(a, b)| same(&a.pose, &b.pose))
+    }
+
     /// Whether two answers command different things: translations more than 60° apart, or rotations that differ by half.
     pub(crate) fn disagrees(&self, other: &Self) -> bool {
         /// Below this, in the unit of the depths, a translation is at its goal.

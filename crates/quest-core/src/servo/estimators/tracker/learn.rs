@@ -10,6 +10,8 @@ use crate::servo::estimators::tracker::{Phase, Tracker};
 const KEY_DISTANCE: f64 = 0.04;
 /// Steps after a new key image at most.
 const STEPS: usize = 8;
+/// With more features than this an image works on one map alone, by a step or a judgement: with a thousand each takes about a millisecond.
+const MANY: usize = 100;
 /// A depth known so well counts in the question whether the scene is a plane.
 const WELL_KNOWN: f64 = 0.01;
 /// Evidence for a plane that is acted on: odds of 1 to 20,000.
@@ -28,32 +30,37 @@ impl<S: PoseSource> Tracker<S> {
         self.add_key_image();
         let task = self.task();
         for k in 0..self.count {
-            if self.hypotheses[k].map.steps_left > 0 {
+            let map = &self.hypotheses[k].map;
+            if map.steps_left > 0 || map.is_to_be_judged {
                 self.adjust(k, &task);
                 // Many features: one map an image.
-                if self.goal.len() > 100 {
+                if self.goal.len() > MANY {
                     break;
                 }
             }
         }
     }
 
-    /// One step of a map; the last one asks how good it is.
+    /// One step of a map, or the question how good it is: with few features both in the image of the last step.
     fn adjust(&mut self, k: usize, task: &Task) {
         let survey = Self::survey(&self.goal, &self.known, &self.keys[..self.key_count], task);
         let map = &mut self.hypotheses[k].map;
-        let before = map.cost;
-        let falls = self.workspace.step(map, &survey);
-        map.steps_left -= 1;
-        if falls && before - map.cost < 1e-3 * map.cost + 1e-3 {
-            map.steps_left = 0;
+        if map.steps_left > 0 {
+            let before = map.cost;
+            let falls = self.workspace.step(map, &survey);
+            map.steps_left -= 1;
+            if falls && before - map.cost < 1e-3 * map.cost + 1e-3 {
+                map.steps_left = 0;
+            }
+            map.is_to_be_judged = map.steps_left == 0;
+            // Before that the old answer stands, unless there is none.
+            let is_known = map.adequacy.is_finite();
+            if (!map.is_to_be_judged || self.goal.len() > MANY) && is_known {
+                return;
+            }
         }
-        let is_last = map.steps_left == 0;
-        // Before that the old answer stands, unless there is none.
-        if is_last || !map.adequacy.is_finite() {
-            self.workspace.judge(map, &survey);
-        }
-        if is_last {
+        self.workspace.judge(map, &survey);
+        if std::mem::take(&mut map.is_to_be_judged) {
             self.reconsider_plane(k);
         }
     }

@@ -36,6 +36,8 @@ pub(crate) struct Map {
     pub(crate) cost: f64,
     /// Steps that are still to be taken: none once the map has settled.
     pub(crate) steps_left: usize,
+    /// Whether it has settled since its adequacy was found.
+    pub(crate) is_to_be_judged: bool,
     /// How wrong the depths may make a translation, relative to its length: see [`adequacy`](super::adequacy).
     pub(crate) adequacy: f64,
     /// The log of the determinant of the information about the key images' poses and the plane.
@@ -54,6 +56,7 @@ impl Map {
             damping: 1e-4,
             cost: f64::NAN,
             steps_left: 0,
+            is_to_be_judged: false,
             adequacy: f64::INFINITY,
             log_information: 0.0,
         }
@@ -65,6 +68,7 @@ impl Map {
         self.normal = Vector3::z();
         self.keys.clear();
         (self.damping, self.cost, self.steps_left, self.adequacy) = (1e-4, f64::NAN, 0, f64::INFINITY);
+        self.is_to_be_judged = false;
         for ((point, place), known) in self.points.iter_mut().zip(goal).zip(known) {
             let (rho, variance) = known.map_or((1.0, relief * relief), |k| (k.rho, k.variance));
             *point = Point { place: *place, rho, variance, is_mapped: known.is_some() };
@@ -77,7 +81,7 @@ impl Map {
         self.keys.extend_from_slice(&other.keys);
         (self.normal, self.relief, self.damping) = (other.normal, other.relief, other.damping);
         (self.cost, self.steps_left, self.adequacy) = (other.cost, other.steps_left, other.adequacy);
-        self.log_information = other.log_information;
+        (self.log_information, self.is_to_be_judged) = (other.log_information, other.is_to_be_judged);
     }
 
     pub(crate) fn is_planar(&self) -> bool {

@@ -31,10 +31,11 @@ use crate::servo::FilterOptions;
 use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion, PoseEstimator};
 use crate::servo::estimators::source::PoseSource;
 use adjust::{Survey, Workspace};
+use consensus::FEW;
 use hypothesis::Hypothesis;
 use map::{KeyImage, Known, Map};
 use resection::{Ground, Task};
-use start::{FEW, Progress, Start, Terms};
+use start::{Progress, Start, Terms};
 
 /// Hypotheses that are kept apart where there are few features, and where there are more.
 const MOST_OF_FEW: usize = 8;

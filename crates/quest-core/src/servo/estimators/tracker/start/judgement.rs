@@ -74,6 +74,9 @@ pub(super) fn likely(square: f64) -> f64 {
     if square < INLIER { bounded(square, KNEE) } else { ANYWHERE }
 }
 
+/// The relief of a wall, as a share of a poster's.
+const EXACT: f64 = 0.1;
+
 /// What the judgement works with.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
@@ -104,7 +107,26 @@ impl Bench {
         chosen: &[bool],
         terms: &Terms<'_>,
     ) -> f64 {
-        let relief = h.map.relief * h.map.relief;
+        // Of a plane it is known that it is one within its relief, but not that it has that much: what the determinant counts of a relief
+        // that is not there grows with the parallax, and the twin with the shorter way would win.
+        let within = self.score_with(h, h.map.relief, image, chosen, terms);
+        if h.map.is_planar() {
+            within.min(self.score_with(h, EXACT * h.map.relief, image, chosen, terms))
+        } else {
+            within
+        }
+    }
+
+    /// The same, of a scene with this relief.
+    fn score_with(
+        &mut self,
+        h: &Hypothesis,
+        relief: f64,
+        image: &KeyImage,
+        chosen: &[bool],
+        terms: &Terms<'_>,
+    ) -> f64 {
+        let relief = relief * relief;
         for (i, point) in self.points.iter_mut().enumerate() {
             let place = terms.goal[i];
             let (rho, variance) =
@@ -123,10 +145,11 @@ impl Bench {
         let Self { points, squares, scratch } = self;
         let fit = resect(points, &image.frame, &adjusted, &task, squares, scratch);
         let other = fit.map_or(f64::INFINITY, |fit| self.evidence(&fit.pose, image, &task));
-        let turn = adjusted.q_21.angle();
+        // A start is within about the features' depth of its goal, and a radian.
+        let (turn, far) = (adjusted.q_21.angle(), adjusted.t_21.norm_squared());
         let wrong_way = terms.travel.norm() > 1e-3 && adjusted.inverse().t_21.dot(&terms.travel) < 0.0;
         let slope = (h.map.normal.x.powi(2) + h.map.normal.y.powi(2)) / PLANE_SLOPE.powi(2);
-        first.min(other) + slope + turn * turn + if wrong_way { WRONG_WAY } else { 0.0 }
+        first.min(other) + slope + turn * turn + far + if wrong_way { WRONG_WAY } else { 0.0 }
     }
 
     /// What the mean image says of a pose. Leaves the squared residuals in `squares`.

@@ -19,7 +19,7 @@ use crate::RelativePose;
 use crate::servo::estimators::depth_filter::first_images::FirstImages;
 use crate::servo::estimators::source::PoseSource;
 use crate::servo::estimators::tracker::adjust::{Survey, Workspace};
-use crate::servo::estimators::tracker::consensus::{Consensus, SAMPLES};
+use crate::servo::estimators::tracker::consensus::{Consensus, FEW};
 use crate::servo::estimators::tracker::hypothesis::Hypothesis;
 use crate::servo::estimators::tracker::map::{KeyImage, Known, PLANE_RELIEF};
 use crate::servo::estimators::tracker::resection::{Fit, Task};
@@ -37,8 +37,6 @@ const STEPS: usize = 15;
 /// The largest cost a feature of an answer: a wrong match costs 18, a right one 2, and at most half of them are wrong. More costs an
 /// adjustment that has not come to its minimum.
 const MOST_COST: f64 = 11.0;
-/// Below so many features all candidates are tried, not those of the consensus alone.
-pub(crate) const FEW: usize = 25;
 /// Room for all of them: 25 candidates, as a scene and as a plane, and four planes.
 const PROPOSALS: usize = 64;
 /// What a translation costs, and a plane's normal: the logs of their priors over their precisions, in steps of two a number.
@@ -51,6 +49,7 @@ const WRONG_WAY: f64 = 30.0;
 enum Stage {
     Averaging,
     Sampling,
+    Proposing,
     Adjusting,
 }
 
@@ -101,6 +100,8 @@ pub(crate) struct Start {
     /// The best rotation.
     pub(crate) rotation: Option<Fit>,
     pub(crate) rng: ChaCha8Rng,
+    /// Starts in a row that led to nothing.
+    failures: usize,
     bench: Bench,
     squares: Vec<f64>,
     scratch: Vec<f64>,
@@ -123,6 +124,7 @@ impl Start {
             count: 0,
             rotation: None,
             rng: ChaCha8Rng::seed_from_u64(0x5e_41_10),
+            failures: 0,
             bench: Bench::new(n),
             squares: vec![f64::NAN; n],
             scratch: Vec::with_capacity(n),
@@ -161,23 +163,29 @@ impl Start {
             }
             Stage::Sampling => {
                 let n = self.consensus.matches.len();
-                let samples = (WORK / (15 + n / 2)).clamp(1, SAMPLES);
-                self.consensus.draw(source, samples, sigma, &mut self.rng);
-                // Of five or six features there are few samples.
-                let wanted = match n {
-                    0..=5 => 1,
-                    6 => 24,
-                    7 => 64,
-                    _ => SAMPLES,
-                };
-                if self.consensus.drawn >= wanted {
-                    self.propose(source, sigma, terms);
-                    self.stage = Stage::Adjusting;
+                let size = source.min_matches().max(5);
+                let samples = (WORK / (15 + n / 2)).max(1);
+                let left = self.wanted(size).saturating_sub(self.consensus.drawn);
+                self.consensus.draw(source, samples.min(left), sigma, &mut self.rng);
+                if self.consensus.drawn < self.wanted(size) {
+                    return Progress::Going;
                 }
+                self.stage = Stage::Proposing;
+                // The candidates of many matches take as long as an image's samples.
+                if n < FEW { self.advance(frame, source, workspace, terms) } else { Progress::Going }
+            }
+            Stage::Proposing => {
+                self.propose(source, sigma, terms);
+                self.stage = Stage::Adjusting;
                 Progress::Going
             }
             Stage::Adjusting => self.adjust(workspace, terms),
         }
+    }
+
+    /// How many samples are drawn: more where the last ones led to nothing.
+    fn wanted(&self, size: usize) -> usize {
+        self.consensus.wanted(size) << self.failures.min(3)
     }
 
     /// The features that take part: spread over all that the mean shows.
@@ -206,11 +214,11 @@ impl Start {
                 self.consensus.offer(candidate.pose, sigma);
             }
         }
-        for (_, pose) in self.consensus.best.into_iter().flatten() {
-            self.add(pose, Depths::Triangulated, &[terms.relief]);
+        for scored in self.consensus.best.into_iter().flatten() {
+            self.add(scored.pose, Depths::Triangulated, &[terms.relief]);
         }
-        if let Some((_, pose)) = self.consensus.best[0] {
-            self.add(pose, Depths::Triangulated, &[PLANE_RELIEF]);
+        if let Some(scored) = self.consensus.best[0] {
+            self.add(scored.pose, Depths::Triangulated, &[PLANE_RELIEF]);
         }
         let planes = self.consensus.candidates_of_inliers(source, true, sigma).clone();
         for candidate in planes.iter().take(4) {
@@ -280,6 +288,7 @@ impl Start {
         if !is_done {
             return Progress::Going;
         }
+        self.failures = if self.count == 0 { self.failures + 1 } else { 0 };
         if self.count == 0 && self.rotation.is_none() { Progress::Nothing } else { Progress::Done }
     }
 
