@@ -11,17 +11,25 @@ from methods import METHODS, PERIOD
 
 from quest_pose.servo import GoalImage
 
-FRONTS = {"sift": "sift", "orb": "orb", "klt": "sift"}
+# The detector of a front end, and whether matches are refined by the goal image: as ``GoalImage`` does it, or not.
+FRONTS = {
+    "sift": ("sift", True), "orb": ("orb", True), "sift-raw": ("sift", False), "orb-raw": ("orb", False),
+    "klt": ("sift", True), "klt-raw": ("sift", False),
+}  # fmt: skip
 MOST = 250
 ACCURATE = 0.02 * scenes.DEPTH, 1.0
 CLOSE = 0.05 * scenes.DEPTH, 3.0
 
 
 class Tracked:
-    """The first image's matches that agree with one essential matrix, tracked from image to image; what is lost stays lost."""
+    """The first image's matches that agree with one essential matrix, tracked from image to image; what is lost stays lost.
 
-    def __init__(self, goal, image):
+    ``refines``: each track is moved to where the goal's patch is, or followed as it is.
+    """
+
+    def __init__(self, goal, image, refines):
         self.last, self.rows = image, goal.match(image)
+        self.refine = goal.refine if refines else None
         seen = np.flatnonzero(np.isfinite(self.rows[:, 0]))
         _, mask = cv2.findEssentialMat(goal.points[seen], self.rows[seen], scenes.K, cv2.USAC_MAGSAC, 0.9999, 1.0)
         self.rows[seen[mask.ravel() == 0]] = np.nan
@@ -38,6 +46,8 @@ class Tracked:
             outside = (rows < 1).any(1) | (rows[:, 0] > scenes.WIDTH - 2) | (rows[:, 1] > scenes.HEIGHT - 2)
             rows[~good | outside] = np.nan
             self.rows[seen] = rows
+            if self.refine is not None:
+                self.rows = self.refine(image, self.rows)
         self.last = image
         return self.rows.copy()
 
@@ -102,13 +112,15 @@ def main():
         for kind in given.scenes.split(","):
             scene = scenes.Scene(kind, number // 4)
             R, p = scenes.start(1000 + number)
-            goal = GoalImage(scene.image(np.eye(3), np.zeros(3)), scenes.CAMERA, detector=FRONTS[given.front])
+            detector, refines = FRONTS[given.front]
+            image = scene.image(np.eye(3), np.zeros(3))
+            goal = GoalImage(image, scenes.CAMERA, detector=detector, refine=refines)
             depths = goal.depths(scene.depth(np.eye(3), np.zeros(3)))
             begin = {"scene": kind, "front": given.front, "start": number, "cm0": 100 * float(np.linalg.norm(p))}
             begin["deg0"] = float(np.degrees(np.linalg.norm(scenes.logarithm(R))))
             for name in given.methods.split(","):
                 scene.noise = np.random.default_rng(77 + number)
-                matcher = Tracked(goal, scene.image(R, p)) if given.front == "klt" else goal
+                matcher = Tracked(goal, scene.image(R, p), refines) if given.front.startswith("klt") else goal
                 record = {**begin, "method": name, **loop(scene, R, p, matcher, METHODS[name](goal, depths))}
                 with open(given.output, "a") as file:
                     file.write(json.dumps(record) + "\n")

@@ -57,6 +57,41 @@ def test_matches_lie_where_the_camera_moved_them(name: str, plane: World) -> Non
     assert outside.any() and (error[outside & matched] > 3).all()
 
 
+def test_refined_matches_do_not_drift(plane: World) -> None:
+    goal = GoalImage(plane.image(*REST), CAMERA, refine=False)
+    truth, image = moved(goal.points, plane), plane.image(*MOVED)
+    rng = np.random.default_rng(22)
+    # Tracks that have drifted, a few lost ones, and one that is wrong.
+    drifted = truth + rng.normal(0, 1.0, truth.shape)
+    drifted[(truth < 12).any(axis=1) | (truth > [WIDTH - 13, HEIGHT - 13]).any(axis=1)] = np.nan
+    seen = np.isfinite(drifted[:, 0])
+    wrong = np.flatnonzero(seen)[0]
+    drifted[wrong] += 40
+    refined = goal.refine(image, drifted)
+    error = np.linalg.norm(refined - truth, axis=1)
+    np.testing.assert_array_equal(np.isfinite(refined[:, 0]), seen)
+    np.testing.assert_array_equal(np.linalg.norm(refined - drifted, axis=1)[seen] < 4, True)
+    assert error[wrong] > 30
+    assert np.median(error[seen]) < 0.2 < np.median(np.linalg.norm(drifted - truth, axis=1)[seen])
+    # What cannot be refined is left.
+    few = np.full(drifted.shape, np.nan)
+    few[:3] = 10.0, 20.0
+    np.testing.assert_array_equal(goal.refine(image, few), few)
+    with pytest.raises(qp.ShapeMismatch, match="points have the shape"):
+        goal.refine(image, drifted[:-1])
+
+
+def test_named_detectors_refine_and_own_ones_are_asked(plane: World) -> None:
+    image = plane.image(*REST)
+    assert GoalImage(image, CAMERA, detector="orb").noise == features.REFINED_NOISE
+    assert GoalImage(image, CAMERA, detector="orb", refine=False).noise == features.NOISE["orb"]
+    own = GoalImage(image, CAMERA, detector=features.detector("orb", 500))
+    refined = GoalImage(image, CAMERA, detector=features.detector("orb", 500), refine=True)
+    assert own.noise == 1.0 and refined.noise == features.REFINED_NOISE
+    error = [np.linalg.norm(g.match(plane.image(*MOVED)) - moved(g.points, plane), axis=1) for g in (own, refined)]
+    assert np.nanmedian(error[1]) < 0.5 * np.nanmedian(error[0])
+
+
 def test_colour_and_grey_are_the_same(goal: GoalImage, plane: World) -> None:
     now = plane.image(*MOVED)
     rows = goal.match(now)
@@ -126,10 +161,11 @@ def bits(image: Any) -> tuple[Array, Any]:
 
 
 def test_a_detector_of_one_s_own(plane: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    goal = GoalImage(plane.image(*REST), detector=bits)
+    image = plane.image(*REST)
+    goal = GoalImage(image, detector=bits)
     assert np.isfinite(goal.match(plane.image(*MOVED))[:, 0]).sum() > 40
     monkeypatch.setitem(sys.modules, "cv2", None)
-    assert len(GoalImage(plane.image(*REST), detector=bits)) == len(goal)
+    assert len(GoalImage(image, detector=bits)) == len(goal)
     with pytest.raises(ImportError, match="pip install opencv-python-headless"):
         GoalImage(goal.image)
 

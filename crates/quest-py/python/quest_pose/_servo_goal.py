@@ -37,6 +37,9 @@ class GoalImage:
         A match has to be closer than this times the next best one.
     mask : array_like of bool, shape (height, width), optional
         False where the goal image must not be used: on the gripper, on what will be gone.
+    refine : bool, optional
+        Whether ``match`` moves its matches to where the goal's patches are, as the method ``refine`` does; this needs OpenCV and
+        takes 1 to 10 ms. Where it is not given: for the named detectors, not for a callable.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class GoalImage:
         max_features: int = 500,
         ratio: float = 0.8,
         mask: ArrayLike | None = None,
+        refine: bool | None = None,
     ) -> None:
         if max_features < FEWEST:
             raise QuestError(f"max_features is {max_features}, expected at least {FEWEST}")
@@ -85,6 +89,7 @@ class GoalImage:
         self._image = features.grey("image", image)
         self._check_camera(camera)
         self._detector, self._ratio = detector, ratio
+        self._refines = isinstance(detector, str) if refine is None else bool(refine)
         # An image from nearer or farther shows other features: several times as many as are kept are looked for.
         self._most = 4 * max_features
         self._detect = features.detector(detector, self._most)
@@ -123,6 +128,13 @@ class GoalImage:
         if None not in size and size != (width, height):
             raise ShapeMismatch(f"image is {width} x {height}, expected {size[0]} x {size[1]} as the camera")
 
+    def _check_size(self, image: features.Image) -> None:
+        if image.shape != self._image.shape:
+            found, expected = image.shape[::-1], self._image.shape[::-1]
+            raise ShapeMismatch(
+                f"image is {found[0]} x {found[1]}, expected {expected[0]} x {expected[1]} as the goal image"
+            )
+
     def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
         if mask is None:
             return None
@@ -149,6 +161,8 @@ class GoalImage:
     @property
     def noise(self) -> float:
         """Pixels: the standard deviation of a matched coordinate that is usual for this detector."""
+        if self._refines:
+            return features.REFINED_NOISE
         return features.NOISE.get(self._detector, 1.0) if isinstance(self._detector, str) else 1.0
 
     @property
@@ -179,18 +193,46 @@ class GoalImage:
             For an image of another shape or type.
         """
         now = features.grey("image", image)
-        if now.shape != self._image.shape:
-            found, expected = now.shape[::-1], self._image.shape[::-1]
-            raise ShapeMismatch(
-                f"image is {found[0]} x {found[1]}, expected {expected[0]} x {expected[1]} as the goal image"
-            )
+        self._check_size(now)
         points, descriptors = features.detect(self._detect, now, self._checked_mask(mask))
         rows = np.full(self._points.shape, np.nan)
         if len(points):
             between = features.distances(self._descriptors, features.comparable(descriptors), self._is_binary)
             found_at = features.pairs(between, self._place, points, self._ratio)
             rows[found_at >= 0] = points[found_at[found_at >= 0]]
-        return rows
+        return features.refined(self._image, self._points, now, rows)[0] if self._refines else rows
+
+    def refine(self, image: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
+        """Matches of one's own, moved to where the goal's patches are in the image. Needs OpenCV.
+
+        A track that is followed from image to image drifts: on rendered scenes by 1 px in 60 images, and by 3 px in a tenth of the
+        tracks, which is enough to end 5 cm beside the goal. Refined by the goal image it is within 0.1 px.
+
+        Parameters
+        ----------
+        image : array_like of uint8
+            The image that ``points`` are from.
+        points : array_like of shape (N, 2)
+            Pixels in the order of the goal's features, NaN for what is not seen: tracks, or what another matcher found.
+
+        Returns
+        -------
+        numpy.ndarray of shape (N, 2)
+            The refined pixels. A feature whose patch is not found within 4 px stays where it was.
+
+        Raises
+        ------
+        ImportError
+            Where OpenCV is not installed.
+        ShapeMismatch, QuestError
+            For an image of another shape or type, and another number of points.
+        """
+        now = features.grey("image", image)
+        self._check_size(now)
+        rows = np.array(points, float)
+        if rows.shape != self._points.shape:
+            raise ShapeMismatch(f"points have the shape {rows.shape}, expected {self._points.shape} as the goal's features")
+        return features.refined(self._image, self._points, now, rows)[0]
 
     def depths(self, depth_image: ArrayLike) -> NDArray[np.float64]:
         """The depths of the goal's features in a depth image that was taken with the goal image.
