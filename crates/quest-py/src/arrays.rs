@@ -108,6 +108,18 @@ pub(crate) fn to_numpy<const D: usize>(py: Python<'_>, rows: Vec<[f64; D]>) -> B
     Array2::from(rows).into_pyarray(py)
 }
 
+/// The count or the seed of the argument `name`. As an argument it is an `i128`, so that what is refused is refused here.
+pub(crate) fn whole<T: TryFrom<i128>>(name: &str, given: i128) -> PyResult<T> {
+    T::try_from(given).map_err(|_| {
+        let digits = 8 * size_of::<T>();
+        let expected = format!("a whole number that is not negative and below 2**{digits}");
+        QuestError::new_err(format!("{name} is {given}, expected {expected}"))
+    })
+}
+
+/// The argument that may be a mask: what is known to be good comes first.
+const SCORES: &str = "scores";
+
 /// An array of real numbers whose shape is still to be checked.
 struct Real<'a, 'py> {
     name: &'a str,
@@ -122,8 +134,10 @@ impl<'a, 'py> Real<'a, 'py> {
         } else {
             Self::viewed(name, given, expected)?
         };
-        // Complex numbers would lose their imaginary part, and NumPy would parse strings.
-        if !b"biuf".contains(&array.dtype().kind()) {
+        // Complex numbers would lose their imaginary part, NumPy would parse strings, and a mask holds no coordinates; it may hold
+        // scores.
+        let kind = array.dtype().kind();
+        if !(b"iuf".contains(&kind) || kind == b'b' && name == SCORES) {
             let dtype = array.dtype();
             return Err(PyTypeError::new_err(format!("{name} has the dtype {dtype}, expected {expected}")));
         }

@@ -11,6 +11,7 @@ use quest_core::CameraError;
 use crate::arrays;
 use crate::errors::{self, BadCamera, QuestError};
 use crate::foreign_camera;
+use crate::supervisor::Supervisor;
 
 /// A calibrated camera, with COLMAP's models and parameters.
 ///
@@ -69,7 +70,26 @@ pub(crate) fn from_k(name: &str, k: &Bound<'_, PyAny>) -> PyResult<quest_core::C
 /// Each of `items` through `one`, with the index of the first that is refused.
 fn each<T, U>(name: &str, items: &[T], one: impl Fn(&T) -> Result<U, CameraError>) -> PyResult<Vec<U>> {
     let indexed = items.iter().enumerate();
-    indexed.map(|(i, item)| one(item).map_err(|e| errors::camera(&format!("{name} {i}"), &e))).collect()
+    watched(indexed.map(|(i, item)| one(item).map_err(|e| errors::camera(&format!("{name} {i}"), &e))))
+}
+
+/// All of the results; a signal ends it. Python's lock must not be held.
+fn watched<T>(mut results: impl Iterator<Item = PyResult<T>>) -> PyResult<Vec<T>> {
+    let supervisor = Supervisor::new(None, 0);
+    let mut all = Vec::with_capacity(results.size_hint().0);
+    let done = || {
+        while !supervisor.poll() {
+            // A few milliseconds of work.
+            for result in results.by_ref().take(10_000) {
+                all.push(result?);
+            }
+            if results.size_hint().1 == Some(0) {
+                break;
+            }
+        }
+        Ok(all)
+    };
+    supervisor.run_here(done)?
 }
 
 /// Model and parameters.
@@ -82,9 +102,11 @@ impl Camera {
     fn new(
         model: &str,
         params: &Bound<'_, PyAny>,
-        width: Option<u32>,
-        height: Option<u32>,
+        width: Option<i128>,
+        height: Option<i128>,
     ) -> PyResult<Self> {
+        let side = |name, side: Option<i128>| side.map(|side| arrays::whole(name, side)).transpose();
+        let (width, height) = (side("width", width)?, side("height", height)?);
         let bad = |error| errors::camera("camera", &error);
         let params = arrays::vector("params", params)?;
         let camera = quest_core::Camera::new(model.parse().map_err(bad)?, &params).map_err(bad)?;
@@ -146,10 +168,12 @@ impl Camera {
         k: &Bound<'_, PyAny>,
         dist: Option<&Bound<'_, PyAny>>,
         fisheye: bool,
-        size: Option<(u32, u32)>,
+        size: Option<(i128, i128)>,
     ) -> PyResult<Self> {
         let k = from_k("k", k)?;
         let dist = dist.map_or_else(|| Ok(Vec::new()), |dist| foreign_camera::flat("dist", dist))?;
+        let side = |side| arrays::whole("size", side);
+        let size = size.map(|(width, height)| Ok::<_, PyErr>((side(width)?, side(height)?))).transpose()?;
         foreign_camera::opencv("camera", &k, &dist, fisheye, size).map(Self)
     }
 
@@ -207,9 +231,9 @@ impl Camera {
         let rays = match invalid {
             "raise" => py.detach(|| each("pixel", &pixels, |&u| self.0.bearing(u).map(Into::into)))?,
             "nan" => py.detach(|| {
-                let ray = |&u| self.0.bearing(u).map_or([f64::NAN; 3], Into::into);
-                pixels.iter().map(ray).collect()
-            }),
+                let ray = |&u| Ok(self.0.bearing(u).map_or([f64::NAN; 3], Into::into));
+                watched(pixels.iter().map(ray))
+            })?,
             _ => {
                 return Err(QuestError::new_err(format!(
                     "invalid is {invalid:?}, expected \"raise\" or \"nan\""
@@ -242,7 +266,7 @@ impl Camera {
         pixels: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let pixels: Vec<[f64; 2]> = arrays::rows("pixels", pixels)?;
-        let found: Vec<bool> = py.detach(|| pixels.iter().map(|&u| self.0.bearing(u).is_ok()).collect());
+        let found = py.detach(|| watched(pixels.iter().map(|&u| Ok(self.0.bearing(u).is_ok()))))?;
         Ok(found.into_pyarray(py))
     }
 

@@ -13,6 +13,7 @@ use quest_colmap::{
 };
 use quest_core::robust::Model;
 
+use crate::arrays;
 use crate::errors::QuestError;
 use crate::estimate_result::Estimate;
 use crate::options;
@@ -48,12 +49,12 @@ pub(crate) fn _colmap_verify(
     py: Python<'_>,
     database: PathBuf,
     pairs: Option<Names>,
-    min_inliers: usize,
+    min_inliers: i128,
     min_inlier_ratio: f64,
     existing: &str,
     uncalibrated: &str,
     watermark: f64,
-    num_threads: usize,
+    num_threads: i128,
     dry_run: bool,
     progress: Option<Py<PyAny>>,
     options: &Bound<'_, PyDict>,
@@ -75,12 +76,12 @@ pub(crate) fn _colmap_verify(
     let options = VerifyOptions {
         pairs,
         search: options::options("verify", Some(options), &["index"], true)?,
-        min_inliers,
+        min_inliers: arrays::whole("min_inliers", min_inliers)?,
         min_inlier_ratio,
         existing,
         uncalibrated,
         watermark,
-        threads: num_threads,
+        threads: arrays::whole("num_threads", num_threads)?,
         dry_run,
     };
     let supervisor = Supervisor::new(progress.as_ref(), 0);
@@ -145,12 +146,13 @@ pub(crate) fn _colmap_export(
     target: PathBuf,
     what: &str,
     pairs: Option<Names>,
-    min_inliers: usize,
+    min_inliers: i128,
     progress: Option<Py<PyAny>>,
     options: &Bound<'_, PyDict>,
 ) -> PyResult<(usize, Vec<(String, String)>)> {
     let are_poses = what == "poses";
     let search = options::options("export_poses", Some(options), &["index"], true)?;
+    let min_inliers = arrays::whole("min_inliers", min_inliers)?;
     let options = VerifyOptions { search, min_inliers, ..VerifyOptions::default() };
     let supervisor = Supervisor::new(progress.as_ref(), 0);
     let exported = py.detach(|| {

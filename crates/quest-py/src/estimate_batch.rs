@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quest_core::Camera;
 use quest_core::correspondence::Usable;
-use quest_core::robust::{Batch, EstimateError, KnownDirection, Options, Problem};
+use quest_core::robust::{Batch, KnownDirection, Options, Problem};
 
 use crate::arrays::{self, Points};
 use crate::batch_result::EstimateBatch;
@@ -75,8 +75,8 @@ pub(crate) fn estimate_batch(
     offsets: &Bound<'_, PyAny>,
     cameras1: Option<&Bound<'_, PyAny>>,
     cameras2: Option<&Bound<'_, PyAny>>,
-    first_index: u64,
-    num_threads: usize,
+    first_index: i128,
+    num_threads: i128,
     scores: Option<&Bound<'_, PyAny>>,
     indices: Option<&Bound<'_, PyAny>>,
     invalid: &str,
@@ -96,7 +96,10 @@ pub(crate) fn estimate_batch(
         (first, second) => first.map(|first| (first.clone(), second.unwrap_or(first))),
     };
     let options = options::options("estimate_batch", options, &["index"], cameras.is_some())?;
+    let first_index = arrays::whole("first_index", first_index)?;
     let options = Options { index: if indices.is_some() { 0 } else { first_index }, ..options };
+    // What is wrong with the options is wrong whether there are pairs or none.
+    options.check().map_err(|error| errors::estimate(&error))?;
     let direction = known_direction.as_ref().map(direction).transpose()?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     if let Some(scores) = scores.as_ref().filter(|scores| scores.len() != x1.len()) {
@@ -116,7 +119,7 @@ pub(crate) fn estimate_batch(
         direction,
         invalid: invalid.parse()?,
         options,
-        num_threads,
+        num_threads: arrays::whole("num_threads", num_threads)?,
     };
     py.detach(|| task.run(progress.as_ref()))
 }
@@ -180,10 +183,6 @@ impl Task {
             let batch = Batch { is_cancelled: &is_cancelled, ..batch };
             supervisor.run(|| batch.estimate(&problems, &self.options))?
         };
-        // What is wrong with the options is wrong for every pair.
-        if let Some(Err(error @ EstimateError::Option { .. })) = found.first() {
-            return Err(errors::estimate(error));
-        }
         let results = found.into_iter().zip(&usable).map(|(found, usable)| {
             if let Some(error) = usable.error().filter(|_| is_refused(usable)) {
                 return Err(error.to_string());

@@ -10,6 +10,7 @@ use crate::arrays;
 use crate::errors::{self, QuestError};
 use crate::estimate::{rotation, vector3};
 use crate::solve::Views;
+use crate::supervisor::apart;
 
 /// `t`, the depths in view 1 and in view 2, the residual, the matches in front.
 type Completed = ([f64; 3], Vec<f64>, Vec<f64>, f64, usize);
@@ -94,7 +95,7 @@ type Drawn<'py> = (
 #[expect(clippy::too_many_arguments, reason = "the keywords of its wrapper")]
 pub(crate) fn _scene<'py>(
     py: Python<'py>,
-    points: usize,
+    points: i128,
     layout: &str,
     motion: &str,
     parallax: Option<f64>,
@@ -103,16 +104,17 @@ pub(crate) fn _scene<'py>(
     noise_px: f64,
     rounded: bool,
     boxes: ([[f64; 2]; 3], [f64; 3]),
-    seed: u64,
-    index: u64,
+    seed: i128,
+    index: i128,
 ) -> PyResult<Drawn<'py>> {
     let base = match view {
         "everywhere" => SceneOptions::default(),
         "in-both-images" => SceneOptions::realistic(),
         _ => return Err(unknown("view", view, "everywhere, in-both-images")),
     };
+    let (seed, index) = (arrays::whole("seed", seed)?, arrays::whole("index", index)?);
     let options = SceneOptions {
-        points,
+        points: arrays::whole("points", points)?,
         layout: match layout {
             "general" => Layout::General,
             "coplanar" => Layout::Coplanar,
@@ -136,8 +138,8 @@ pub(crate) fn _scene<'py>(
         rounded,
         view: if view == "everywhere" { View::Everywhere } else { View::InBothImages },
     };
-    let drawn = py.detach(|| Scene::generate(&options, seed, index));
-    let scene = drawn.map_err(|error: SceneError| QuestError::new_err(error.to_string()))?;
+    let drawn = py.detach(|| apart(move || Scene::generate(&options, seed, index)));
+    let scene = drawn?.map_err(|error: SceneError| QuestError::new_err(error.to_string()))?;
     let on_plane = |b: &Vector3<f64>| [b.x / b.z, b.y / b.z];
     let image1 = scene.matches.iter().map(|m| on_plane(m.bearing1())).collect();
     let image2 = scene.matches.iter().map(|m| on_plane(m.bearing2())).collect();

@@ -4,7 +4,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quest_core::polynomial_system::{Options, RankDecision, Report, System, solve};
 
+use crate::arrays::whole;
 use crate::errors::{NoAnswer, QuestError};
+use crate::supervisor::apart;
 
 /// Of each solution the real and the imaginary parts of the unknowns; residuals; multiplicities; which are real; how many are at
 /// infinity; the report.
@@ -17,17 +19,21 @@ pub(crate) fn _solve_polynomials(
     py: Python<'_>,
     unknowns: usize,
     equations: Vec<Vec<(f64, Vec<u8>)>>,
-    solutions: Option<usize>,
-    max_rounds: usize,
-    max_monomials: usize,
-    seed: u64,
+    solutions: Option<i128>,
+    max_rounds: i128,
+    max_monomials: i128,
+    seed: i128,
 ) -> PyResult<Found<'_>> {
-    let options = Options { solutions, max_rounds, max_monomials, seed, ..Options::default() };
-    let found = py.detach(|| {
-        let system =
-            System::new(unknowns, equations).map_err(|error| QuestError::new_err(error.to_string()))?;
-        solve(&system, &options).map_err(|error| NoAnswer::new_err(error.to_string()))
-    })?;
+    let options = Options {
+        solutions: solutions.map(|count| whole("solutions", count)).transpose()?,
+        max_rounds: whole("max_rounds", max_rounds)?,
+        max_monomials: whole("max_monomials", max_monomials)?,
+        seed: whole("seed", seed)?,
+        ..Options::default()
+    };
+    let system = System::new(unknowns, equations).map_err(|error| QuestError::new_err(error.to_string()))?;
+    let found = py.detach(|| apart(move || solve(&system, &options)))?;
+    let found = found.map_err(|error| NoAnswer::new_err(error.to_string()))?;
     let all = &found.all;
     Ok((
         all.iter().map(|s| s.x.iter().map(|x| x.re).collect()).collect(),

@@ -15,6 +15,7 @@ pub(crate) use self::controller::Controller;
 use self::controller::locked;
 use self::given::{Given, Loop, positive};
 pub(crate) use self::joints::joint_velocities;
+use crate::arrays;
 use crate::errors::QuestError;
 
 /// A controller that moves a free camera, on an arm or a quadrotor, to where the goal image was taken.
@@ -86,7 +87,7 @@ impl CameraServo {
         max_acceleration: Option<f64>,
         max_turn_acceleration: Option<f64>,
         noise: f64,
-        goal_images: u32,
+        goal_images: i128,
         period: f64,
         unit: Option<f64>,
         rate: f64,
@@ -96,7 +97,7 @@ impl CameraServo {
         tolerance: f64,
         angle_tolerance: f64,
         arrival_time: f64,
-        coasting_images: usize,
+        coasting_images: i128,
         largest_gap: f64,
         axes: Option<Vec<String>>,
         camera_in_hand: Option<&Bound<'_, PyAny>>,
@@ -111,7 +112,7 @@ impl CameraServo {
             limits: (max_speed, max_turn_rate),
             acceleration: (max_acceleration, max_turn_acceleration),
             noise,
-            goal_images,
+            goal_images: arrays::whole("goal_images", goal_images)?,
             period,
             unit,
             depths,
@@ -120,7 +121,7 @@ impl CameraServo {
             plane: None,
             border: 0.0,
             explore,
-            coasting_images,
+            coasting_images: arrays::whole("coasting_images", coasting_images)?,
             largest_gap,
             arrival: (tolerance, angle_tolerance, arrival_time),
             mount,
@@ -224,7 +225,7 @@ impl RobotServo {
         max_acceleration: Option<f64>,
         max_turn_acceleration: Option<f64>,
         noise: f64,
-        goal_images: u32,
+        goal_images: i128,
         period: f64,
         unit: Option<f64>,
         speed_gain: f64,
@@ -237,7 +238,7 @@ impl RobotServo {
         tolerance: f64,
         angle_tolerance: f64,
         arrival_time: f64,
-        coasting_images: usize,
+        coasting_images: i128,
         largest_gap: f64,
         camera_in_base: Option<&Bound<'_, PyAny>>,
         solver: Option<&str>,
@@ -253,7 +254,7 @@ impl RobotServo {
             limits: (max_speed, max_turn_rate),
             acceleration: (max_acceleration, max_turn_acceleration),
             noise,
-            goal_images,
+            goal_images: arrays::whole("goal_images", goal_images)?,
             period,
             unit,
             depths,
@@ -262,7 +263,7 @@ impl RobotServo {
             plane,
             border,
             explore,
-            coasting_images,
+            coasting_images: arrays::whole("coasting_images", coasting_images)?,
             largest_gap,
             arrival: (tolerance, angle_tolerance, arrival_time),
             mount,
@@ -295,6 +296,39 @@ impl RobotServo {
         self.set_gains(self.get_speed_gain(), positive("turn_gain", value)?)
     }
 
+    /// float : The robot stops within so many metres of its goal, with ``unit``. It can be set.
+    #[getter]
+    fn get_stop_distance(&self) -> f64 {
+        self.distance(|law| law.stop_distance)
+    }
+
+    #[setter]
+    fn set_stop_distance(&self, value: f64) -> PyResult<()> {
+        self.set_distance("stop_distance", value, |law| &mut law.stop_distance)
+    }
+
+    /// float : It also stops within so many metres where the goal lies sideways, which driving cannot mend. It can be set.
+    #[getter]
+    fn get_sideways_distance(&self) -> f64 {
+        self.distance(|law| law.sideways_distance)
+    }
+
+    #[setter]
+    fn set_sideways_distance(&self, value: f64) -> PyResult<()> {
+        self.set_distance("sideways_distance", value, |law| &mut law.sideways_distance)
+    }
+
+    /// float : Once stopped it starts again beyond so many metres, more than both others. It can be set.
+    #[getter]
+    fn get_start_distance(&self) -> f64 {
+        self.distance(|law| law.start_distance)
+    }
+
+    #[setter]
+    fn set_start_distance(&self, value: f64) -> PyResult<()> {
+        self.set_distance("start_distance", value, |law| &mut law.start_distance)
+    }
+
     /// bool : Whether the robot has arrived, and only turns to the goal's heading.
     #[getter]
     fn has_arrived(&self) -> bool {
@@ -303,6 +337,36 @@ impl RobotServo {
 }
 
 impl RobotServo {
+    /// A distance of the law in metres.
+    fn distance(&self, of: impl Fn(&DifferentialDriveLaw) -> f64) -> f64 {
+        let mut shared = locked(&self.0);
+        shared.servo.rig_mut().unit * of(shared.servo.law())
+    }
+
+    /// Sets a distance of the law, in metres, unless the robot would start again where it stops.
+    fn set_distance(
+        &self,
+        name: &str,
+        value: f64,
+        of: impl Fn(&mut DifferentialDriveLaw) -> &mut f64,
+    ) -> PyResult<()> {
+        let value = positive(name, value)?;
+        let mut shared = locked(&self.0);
+        let unit = shared.servo.rig_mut().unit;
+        let mut law = *shared.servo.law();
+        *of(&mut law) = value / unit;
+        let stops = law.stop_distance.max(law.sideways_distance);
+        if stops >= law.start_distance {
+            return Err(QuestError::new_err(format!(
+                "{name} is {value}, expected start_distance ({} m) above stop_distance and sideways_distance ({} m)",
+                unit * law.start_distance,
+                unit * stops
+            )));
+        }
+        *shared.servo.law_mut() = law;
+        Ok(())
+    }
+
     fn set_gains(&self, k1: f64, k2: f64) -> PyResult<()> {
         let mut shared = locked(&self.0);
         let gains = converging(k1, k2, shared.servo.rig_mut().unit)?;

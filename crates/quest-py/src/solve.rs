@@ -11,6 +11,10 @@ use crate::arrays::{self, Points};
 use crate::camera;
 use crate::candidate::Candidate;
 use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
+use crate::supervisor::apart;
+
+/// So many matches take a few hundredths of a second: with more a signal has to be answered meanwhile.
+const LONG: usize = 20_000;
 
 /// Candidate poses from five or more correct matches.
 ///
@@ -77,7 +81,8 @@ pub(crate) fn solve(
         feasibility.parse().map_err(|error: UnknownFeasibility| QuestError::new_err(error.to_string()))?;
     let kinds: Kinds = kinds.parse().map_err(|error: UnknownKinds| QuestError::new_err(error.to_string()))?;
     let views = Views::new(x1, x2, camera1, camera2)?;
-    let solved = py.detach(|| {
+    let is_long = views.given() > LONG;
+    let solved = move || {
         let matches = views.matches()?;
         let (found, needed) = (matches.len(), solver.info().min_matches);
         if found < needed {
@@ -87,8 +92,11 @@ pub(crate) fn solve(
         solver.solve(kinds, &matches, &mut out);
         let candidates: Vec<_> = out.iter().map(|c| Candidate::new(c, &matches, feasibility)).collect();
         Ok((candidates, out.degeneracy()))
-    });
-    match solved.map_err(|error| errors::input(&error))? {
+    };
+    match py
+        .detach(|| if is_long { apart(solved) } else { Ok(solved()) })?
+        .map_err(|error| errors::input(&error))?
+    {
         (candidates, Some(degeneracy)) if candidates.is_empty() => Err(errors::degenerate(degeneracy)),
         (candidates, _) => candidates.into_iter().map(|candidate| candidate.into_python(py)).collect(),
     }
@@ -123,10 +131,11 @@ pub(crate) fn constraint_matrix<'py>(
     x2: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let views = Views::new(x1, x2, None, None)?;
-    let rows = py.detach(|| {
-        let matches = views.matches().map_err(|error| errors::input(&error))?;
-        quaternion::constraint_matrix(&matches).map_err(|error| errors::input(&error))
-    })?;
+    // The third power of the number of matches.
+    let is_long = views.given() > 100;
+    let rows = move || quaternion::constraint_matrix(&views.matches()?);
+    let rows = py.detach(|| if is_long { apart(rows) } else { Ok(rows()) })?;
+    let rows = rows.map_err(|error| errors::input(&error))?;
     Ok(arrays::to_numpy(py, rows))
 }
 
@@ -185,6 +194,14 @@ impl Views {
         match self {
             Self::Pixels(cameras, ..) => Some(cameras),
             _ => None,
+        }
+    }
+
+    /// How many points view 1 has.
+    fn given(&self) -> usize {
+        match self {
+            Self::Image(x1, _) | Self::Pixels(_, x1, _) => x1.len(),
+            Self::Bearings(x1, _) => x1.len(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! `solve_batch`: many samples of five matches at once.
 
 use std::num::NonZero;
-use std::thread;
+use std::thread::{self, ScopedJoinHandle};
 
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
@@ -11,6 +11,7 @@ use quest_core::{Candidates, Correspondence, InputError};
 
 use crate::arrays::{self, Samples};
 use crate::errors::{self, QuestError, ShapeMismatch};
+use crate::supervisor::Supervisor;
 
 type Columns<'py> = (
     Bound<'py, PyArray1<i64>>,
@@ -82,17 +83,33 @@ fn solve<const D: usize>(
         return Err(ShapeMismatch::new_err(message));
     }
     if x1.len() <= MIN_SHARE {
-        return solve_part(0, x1, x2, &make);
+        return solve_part(0, x1, x2, &make, &|| false);
     }
+    let supervisor = Supervisor::new(None, 0);
+    supervisor.run(|| solve_parts(x1, x2, &make, &|| supervisor.is_cancelled()))?
+}
+
+/// The same on all threads of the machine, as far as the system gives them.
+fn solve_parts<const D: usize>(
+    x1: &[[[f64; D]; 5]],
+    x2: &[[[f64; D]; 5]],
+    make: &impl Match<D>,
+    is_cancelled: &(impl Fn() -> bool + Sync),
+) -> PyResult<Solved> {
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
     let share = x1.len().div_ceil(threads).max(MIN_SHARE);
     let parts: Vec<_> = thread::scope(|scope| {
-        let part = |(part, (x1, x2))| {
-            let make = &make;
-            scope.spawn(move || solve_part(part * share, x1, x2, make))
+        let chunks = x1.chunks(share).zip(x2.chunks(share)).enumerate();
+        let start = |(part, (x1, x2))| {
+            let work = move || solve_part(part * share, x1, x2, make, is_cancelled);
+            (work, thread::Builder::new().spawn_scoped(scope, work))
         };
-        let running: Vec<_> = x1.chunks(share).zip(x2.chunks(share)).enumerate().map(part).collect();
-        running.into_iter().map(thread::ScopedJoinHandle::join).collect()
+        let running: Vec<_> = chunks.map(start).collect();
+        // A part whose thread was refused is done here.
+        running
+            .into_iter()
+            .map(|(work, thread)| thread.map_or_else(|_| Ok(work()), ScopedJoinHandle::join))
+            .collect()
     });
     let mut all = Solved::default();
     for part in parts {
@@ -116,12 +133,16 @@ fn solve_part<const D: usize>(
     x1: &[[[f64; D]; 5]],
     x2: &[[[f64; D]; 5]],
     make: &impl Match<D>,
+    is_cancelled: &impl Fn() -> bool,
 ) -> PyResult<Solved> {
     let solver = BatchSolver::new(Tolerance::Tight);
     let (mut found, mut candidates) = (Essentials::new(), Candidates::new());
     let (mut matches, mut samples) = (Vec::new(), Vec::new());
     let mut out = Solved::default();
     for (batch, (x1, x2)) in x1.chunks(BATCH).zip(x2.chunks(BATCH)).enumerate() {
+        if is_cancelled() {
+            break;
+        }
         matches.clear();
         samples.clear();
         for (k, (a, b)) in x1.iter().zip(x2).enumerate() {

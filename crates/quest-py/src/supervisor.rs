@@ -2,14 +2,45 @@
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
+use crate::errors::QuestError;
+
 /// How often Python is asked: often enough for a signal to be answered within two tenths of a second.
 const PERIOD: Duration = Duration::from_millis(50);
+
+/// Runs work that does not ask whether it is to end on a thread of its own. A signal ends the call; the thread goes on alone to the
+/// end of its work, whose result nobody gets. Python's lock must not be held.
+pub(crate) fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    // Kept here too, since a thread that is refused takes what it was given with it.
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let (sender, result) = mpsc::sync_channel(1);
+    let theirs = Arc::clone(&work);
+    let start = thread::Builder::new().spawn(move || {
+        if let Some(work) = take(&theirs) {
+            // Nobody waits for it any more after a signal.
+            let _ = sender.send(work());
+        }
+    });
+    let ended = || QuestError::new_err("the thread of the work ended early");
+    let Ok(worker) = start else { return take(&work).map(|work| work()).ok_or_else(ended) };
+    loop {
+        match result.recv_timeout(PERIOD) {
+            Ok(result) => return Ok(result),
+            Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+            Err(RecvTimeoutError::Disconnected) => match worker.join() {
+                Err(panic) => resume_unwind(panic),
+                Ok(()) => return Err(ended()),
+            },
+        }
+    }
+}
 
 /// Ends work that a signal, or the callable that is told of its progress, wants ended.
 pub(crate) struct Supervisor<'a> {
@@ -42,14 +73,19 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Runs work on other threads, which have to ask [`is_cancelled`](Self::is_cancelled) often; Python's lock must not be held.
+    /// Where the system refuses a thread, this one does the work, and cannot ask Python meanwhile.
     pub(crate) fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> PyResult<T> {
         let caller = thread::current();
+        // Not moved into the thread, which takes what it was given with it where it is refused.
+        let work = Mutex::new(Some(work));
+        let take = || work.lock().unwrap_or_else(PoisonError::into_inner).take();
         let result = thread::scope(|scope| {
-            let worker = scope.spawn(move || {
-                let result = work();
+            let start = thread::Builder::new().spawn_scoped(scope, || {
+                let result = take().map(|work| work());
                 caller.unpark();
                 result
             });
+            let Ok(worker) = start else { return take().map(|work| work()) };
             while !worker.is_finished() {
                 thread::park_timeout(PERIOD);
                 self.poll();
@@ -57,7 +93,7 @@ impl<'a> Supervisor<'a> {
             worker.join().unwrap_or_else(|panic| resume_unwind(panic))
         });
         self.finish()?;
-        Ok(result)
+        result.ok_or_else(|| QuestError::new_err("the work was not begun"))
     }
 
     /// Sets how many things are done, and how many there are.

@@ -6,6 +6,7 @@ use quest_core::robust::{self, Options};
 
 use crate::estimate_result::Estimate;
 use crate::solve::Views;
+use crate::supervisor::apart;
 use crate::{errors, options};
 
 /// The disagreement of the depths, that with the other pose, and the ratio of the lengths of the translations.
@@ -38,7 +39,7 @@ pub(crate) fn _third_view(
     let found = py.detach(|| {
         let matches = |views: &Views| views.matches().map_err(|error| errors::input(&error));
         let (matches_21, matches_31) = (matches(&pairs[0])?, matches(&pairs[1])?);
-        robust::estimate_with_third_view(&matches_21, &first, &matches_31, &second)
+        apart(move || robust::estimate_with_third_view(&matches_21, &first, &matches_31, &second))?
             .map_err(|error| errors::estimate(&error))
     })?;
     let decision = found.choice.map(|c| (c.disagreement, c.next_best, c.ratio));

@@ -262,6 +262,14 @@ def test_settings_are_those_given_and_can_be_set(kind: Any) -> None:
         if name != "coasting_images":
             with pytest.raises(qp.QuestError, match=f"{name} is -1"):
                 setattr(changed, name, -1.0)
+    # What the constructor does not ask for.
+    for name, value in {"rotation_uncertainty": 5.0, "translation_uncertainty": 0.1}.items():
+        assert getattr(changed, name) == pytest.approx(getattr(made, name)), name
+        setattr(changed, name, value)
+        assert getattr(changed, name) == pytest.approx(value), name
+        with pytest.raises(qp.QuestError, match=f"{name} is 0"):
+            setattr(changed, name, 0.0)
+        setattr(changed, name, getattr(made, name))
     changed.watchdog = False
     assert not changed.watchdog
     for _ in range(20):
@@ -280,6 +288,29 @@ def test_gains_can_be_set() -> None:
     with pytest.raises(qp.QuestError, match="speed_gain / unit = 2: the law would not converge"):
         robot.speed_gain = 4.0
     assert robot.speed_gain == 0.75
+
+
+def test_a_tighter_limit_of_the_uncertainty_holds() -> None:
+    strict = servo.CameraServo(GOAL, **LIMITS, noise=1e-3)
+    strict.rotation_uncertainty = 1e-9
+    steps = [strict.step(GOOD) for _ in range(30)]
+    assert steps[-1].state == "uncertain"
+    assert all(np.linalg.norm(step.linear) == 0 for step in steps)
+
+
+def test_the_robot_s_distances_can_be_set() -> None:
+    robot = servo.RobotServo(GOAL, **LIMITS, noise=1e-3, unit=2.0)
+    assert robot.stop_distance == pytest.approx(0.005)
+    assert robot.sideways_distance == pytest.approx(0.06)
+    assert robot.start_distance == pytest.approx(0.24)
+    robot.start_distance = 0.3
+    robot.stop_distance = 0.02
+    assert robot.start_distance == pytest.approx(0.3) and robot.stop_distance == pytest.approx(0.02)
+    with pytest.raises(qp.QuestError, match="stop_distance is 0.4, expected start_distance"):
+        robot.stop_distance = 0.4
+    with pytest.raises(qp.QuestError, match="start_distance is -1"):
+        robot.start_distance = -1.0
+    assert robot.stop_distance == pytest.approx(0.02)
 
 
 def test_a_controller_of_no_kind_cannot_be_made() -> None:

@@ -484,6 +484,8 @@ class Controller:
     arrival_time: float
     coasting_images: int
     largest_gap: float
+    rotation_uncertainty: float
+    translation_uncertainty: float
     watchdog: bool
 
 @final
@@ -548,6 +550,9 @@ class RobotServo(Controller):
     ) -> RobotServo: ...
     speed_gain: float
     turn_gain: float
+    stop_distance: float
+    sideways_distance: float
+    start_distance: float
     @property
     def has_arrived(self) -> bool: ...
 

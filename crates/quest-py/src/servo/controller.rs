@@ -258,8 +258,8 @@ impl Controller {
     }
 
     #[setter]
-    fn set_coasting_images(&self, value: usize) -> PyResult<()> {
-        self.set(Ok(value), |s| &mut s.coasting_images)
+    fn set_coasting_images(&self, value: i128) -> PyResult<()> {
+        self.set(arrays::whole("coasting_images", value), |s| &mut s.coasting_images)
     }
 
     /// float : An image that is older than so many seconds is stale. It can be set.
@@ -271,6 +271,30 @@ impl Controller {
     #[setter]
     fn set_largest_gap(&self, value: f64) -> PyResult<()> {
         self.set(not_negative("largest_gap", value), |s| &mut s.largest_gap)
+    }
+
+    /// float : Where the rotation's standard deviation is larger, in degrees, the loop holds as ``"uncertain"``. It can be set.
+    #[getter]
+    fn get_rotation_uncertainty(&self) -> f64 {
+        self.get(|s| s.rotation_uncertainty).to_degrees()
+    }
+
+    #[setter]
+    fn set_rotation_uncertainty(&self, value: f64) -> PyResult<()> {
+        self.set(positive("rotation_uncertainty", value).map(f64::to_radians), |s| {
+            &mut s.rotation_uncertainty
+        })
+    }
+
+    /// float : The same of the translation, as a share of ``unit``. It can be set.
+    #[getter]
+    fn get_translation_uncertainty(&self) -> f64 {
+        self.get(|s| s.translation_uncertainty)
+    }
+
+    #[setter]
+    fn set_translation_uncertainty(&self, value: f64) -> PyResult<()> {
+        self.set(positive("translation_uncertainty", value), |s| &mut s.translation_uncertainty)
     }
 
     /// bool : Whether the loop holds, as ``"diverging"``, where the distance does not fall although motion is commanded. It can
