@@ -33,13 +33,18 @@ pub(crate) fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static
     loop {
         match result.recv_timeout(PERIOD) {
             Ok(result) => return Ok(result),
-            Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+            Err(RecvTimeoutError::Timeout) => Python::attach(signals)?,
             Err(RecvTimeoutError::Disconnected) => match worker.join() {
                 Err(panic) => resume_unwind(panic),
                 Ok(()) => return Err(ended()),
             },
         }
     }
+}
+
+/// The error of a signal that has come. A closure would be called redundant, and the method itself has too short a lifetime.
+fn signals(py: Python<'_>) -> PyResult<()> {
+    py.check_signals()
 }
 
 /// Ends work that a signal, or the callable that is told of its progress, wants ended.
