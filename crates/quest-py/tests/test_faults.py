@@ -80,8 +80,9 @@ def test_a_call_that_takes_long_ends_by_ctrl_c(name: str) -> None:
         [sys.executable, "-c", CTRL_C.format(setup=setup, call=call)], capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr
-    # A call asks 20 times a second; the rest is for a machine that is busy, and for arrays that come back.
-    assert float(done.stdout) < 1.0
+    # A call asks 20 times a second. The rest is for a machine that is busy, and for arrays that come back: a call that is deaf takes
+    # ten seconds or more.
+    assert float(done.stdout) < 5.0
 
 
 @posix
