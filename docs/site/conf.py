@@ -5,22 +5,34 @@ Pages of the repository are not copied. A line `<!-- include: docs/RESULTS.md --
 """
 
 import inspect
+import logging
 import os
 import re
 import types
 from pathlib import Path
 
 import quest_pose
+from docutils import nodes
+from latex2mathml import converter
 
 ROOT = Path(__file__).resolve().parents[2]
 
 project = "quest-pose"
-author = "the quest-pose contributors"
+author = copyright = "the quest-pose contributors"
 release = quest_pose.__version__
 repository = "https://github.com/quest-pose/quest-pose"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["build"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["build", "**/.ipynb_checkpoints"]
+# Notebooks are kept without outputs and run each time; one that fails ends the build.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+nb_merge_streams = True
+nb_code_prompt_show = "Show the code of this picture"
+nb_code_prompt_hide = "Hide the code of this picture"
+# nbclient names every notebook that it runs.
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 4
 # The docstrings are in NumPy's form.
@@ -28,6 +40,9 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
+
+# Formulas are MathML, which browsers draw themselves: the site works offline.
+html_math_renderer = "mathml"
 
 html_theme = "furo"
 html_title = "quest-pose"
@@ -111,6 +126,17 @@ def plain_docstring(app, what, name, obj, options, lines):
         del lines[:]
 
 
+def formula(display):
+    """What writes a formula into a page."""
+
+    def visit(translator, node):
+        translator.body.append(converter.convert(node.astext(), display="block" if display else "inline"))
+        raise nodes.SkipNode
+
+    return visit, None
+
+
 def setup(app):
+    app.add_html_math_renderer("mathml", formula(display=False), formula(display=True))
     app.connect("source-read", include_files)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)
