@@ -156,6 +156,7 @@ mod tests {
             name: None,
             solver: "quest",
             matches: 120,
+            reason: None,
             degeneracy: None,
             feasibility: None,
             third_view: None,

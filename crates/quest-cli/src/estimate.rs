@@ -8,17 +8,19 @@ use clap::{Args, ValueEnum};
 use quest_core::correspondence::Usable;
 use quest_core::robust::{self, Estimate, EstimateError, KnownDirection, Options, Priors, ThirdView};
 use quest_core::{Correspondence, InputError, RelativePose};
-use quest_io::{EstimateRecord, Pair, ReadError, ThirdViewRecord};
+use quest_io::{EstimateRecord, Fault, Pair, ReadError, ThirdViewRecord};
 
 use crate::{
     Failure, Outcome,
     estimate_options::{EstimateOptions, OfEstimate, parse_direction, parse_pose},
     estimate_table,
     in_order::in_order,
-    input::InputOptions,
+    input::{InputsOptions, Unread},
     options::OutputOptions,
     progress::Progress,
-    rows, words,
+    rows,
+    tally::{Refusal, Tally},
+    words,
     writer::{Record, Writer},
 };
 
@@ -31,11 +33,13 @@ Examples:
   quest-cli estimate pair.json --threshold 1.5 --seed 7 --format json
   quest-cli estimate points.csv --threshold 0.001
   quest-cli estimate pairs.jsonl -o results.jsonl
+  quest-cli estimate 'pairs/*.npz' --camera1 PINHOLE,640,480,500,500,320,240 -o results.jsonl
   quest-cli estimate pairs.jsonl -o results.jsonl --resume     after it was ended
   quest-cli estimate views12.json --third views13.json
 
-Files are those of `quest-cli solve`. With scores the best matches are tried first. All cores work on the
-pairs of JSON Lines; the results are in the order of the lines.
+Files are those of `quest-cli solve`, whose help describes them; several of them, folders and patterns are
+read one after the other. With scores the best matches are tried first. All cores work on the pairs of
+JSON Lines and of several files; the results are in their order.
 With --third the poses of views 1 and 2 and of views 1 and 3 are chosen so that the depths of their
 common points agree; a point is common where its numbers in view 1 are the same.
 
@@ -44,25 +48,25 @@ Results:
   The model is general, planar or pure_rotation (no translation that stands clear of the noise);
   the evidence is the median residual of the inliers under each. A plane may have a second pose that the
   noise does not rule out, the runner-up, and so may a camera that hardly moved.
-  Matches that determine no pose, such as points on a line, are bad input. Among JSON Lines their model is
-  degenerate, with a reason and without a pose. No line stops the others: one that cannot be read gets a
-  record with its reason. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
+  Matches that determine no pose, such as points on a line, are bad input. Among several pairs their model is
+  degenerate, with a reason and without a pose. No line and no file stops the others: one that cannot be
+  read gets a record with its reason. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
   at the end; --resume goes on after the records that are there.
   A pixel without a viewing ray is an outlier, and so is a match with a coordinate that is NaN, infinite or
   missing (null in JSON, an empty field in CSV). invalid_count tells how many there are.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
-  The same seed gives the same answer; each line of JSON Lines has random numbers of its own.
+  The same seed gives the same answer; each of several pairs has random numbers of its own.
 
 Exit status:
-  0 an answer, 1 no pose could be found (JSON Lines: for one or more of the lines),
-  2 bad input or arguments (JSON Lines: none of the lines could be read).";
+  0 an answer, 1 no pose could be found (of several pairs: for one or more of them),
+  2 bad input or arguments (of several pairs: none of them could be read).";
 
 /// One pose from matches with outliers.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    input: InputOptions,
+    input: InputsOptions,
     #[command(flatten)]
     search: EstimateOptions<OfEstimate>,
     /// A pose to begin with: a quaternion, scalar first, and a translation, whose length plays no part.
@@ -112,20 +116,23 @@ struct Estimated {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut pairs = arguments.input.open(arguments.output.quiet)?;
-    let is_lines = pairs.is_lines();
-    arguments.check(is_lines)?;
-    let (mut writer, there) = Writer::open_long(&arguments.output, is_lines, arguments.resume)?;
+    let mut pairs = arguments.input.open(&arguments.output)?;
+    let is_several = pairs.is_several();
+    arguments.check(is_several)?;
+    let (mut writer, there) = Writer::open_long(&arguments.output, is_several, arguments.resume)?;
     let progress = Progress::new("pairs", None, arguments.output.quiet);
-    let mut tally = Tally { are_there: there > 0, ..Tally::default() };
-    let numbered = (arguments.first_index..).map_while(|index| Some((index, pairs.next().transpose()?)));
+    let mut tally = Tally::after(there);
+    let numbered = (arguments.first_index..).map_while(|index| {
+        let pair = pairs.next().transpose()?;
+        Some((index, pair.map_err(|error| pairs.alone(error))))
+    });
     let done = in_order(
         arguments.threads,
         numbered.skip(there),
-        |(index, pair): (u64, Result<Pair, ReadError>)| match pair {
-            Ok(pair) => one_pair(arguments, index, &pair, is_lines),
-            Err(error) if is_lines && error.place.line.is_some() => Ok(Estimated::unreadable(error)),
-            Err(error) => Err(error.into()),
+        |(index, pair): (u64, Result<Pair, Result<Unread, ReadError>>)| match pair {
+            Ok(pair) => one_pair(arguments, index, &pair, is_several),
+            Err(Ok(unread)) => Ok(Estimated::unreadable(unread)),
+            Err(Err(error)) => Err(error.into()),
         },
         |estimated: Result<Estimated, Failure>| {
             let Estimated { heading, record, focal_length, refusal } = estimated?;
@@ -139,84 +146,41 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // What was answered is kept, whatever ended the run; of one pair there is nothing. Where it could not be written it ends within a
     // line, and stays in the part.
     let is_whole = !matches!(done, Err(Failure::Write(_)));
-    if is_whole && (is_lines || done.is_ok()) {
-        writer.finish(is_lines)?;
+    if is_whole && (is_several || done.is_ok()) {
+        writer.finish(is_several)?;
     }
     done?;
     tally.outcome()
 }
 
-/// Why there is no pose, with the place.
-enum Refusal {
-    NoPose(String),
-    Unreadable(ReadError),
-}
-
-/// What the lines of a file came to.
-#[derive(Default)]
-struct Tally {
-    /// Whether any pair could be read, or had been.
-    are_there: bool,
-    is_without_pose: bool,
-    /// The first line that could not be read.
-    unreadable: Option<ReadError>,
-}
-
-impl Tally {
-    /// Tells of a pair without a pose, and counts it.
-    fn count(&mut self, refusal: Option<Refusal>) {
-        self.is_without_pose |= refusal.is_some();
-        match refusal {
-            Some(Refusal::Unreadable(error)) => {
-                words::say("no pose", &error.to_string());
-                self.unreadable.get_or_insert(error);
-                return;
-            }
-            Some(Refusal::NoPose(reason)) => words::say("no pose", &reason),
-            None => {}
-        }
-        self.are_there = true;
-    }
-
-    fn outcome(self) -> Result<Outcome, Failure> {
-        match self.unreadable {
-            Some(error) if !self.are_there => Err(error.into()),
-            _ if self.is_without_pose => Ok(Outcome::NoPose),
-            _ => Ok(Outcome::Answer),
-        }
-    }
-}
-
 impl Estimated {
-    /// A line that is no pair.
-    fn unreadable(error: ReadError) -> Self {
+    /// A line or a file that is no pair.
+    fn unreadable(Unread { name, error }: Unread) -> Self {
         let heading = words::one_line(&format!("{}: no pose", error.place));
-        let record = EstimateRecord::unanswered(None, error.to_string());
+        let record = EstimateRecord::unanswered(name, error.to_string());
         Self { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)) }
     }
 }
 
 impl Arguments {
-    fn options(&self, pair: &Pair, index: u64) -> Result<Options, Failure> {
+    fn options(&self, pair: &Pair, index: u64) -> Result<Options, ReadError> {
         match (&pair.cameras, self.search.threshold) {
             (Some([camera1, camera2]), threshold) => {
                 let options = self.search.options(threshold.unwrap_or(THRESHOLD), index);
                 Ok(options.with_cameras(camera1, camera2))
             }
             (None, Some(threshold)) => Ok(self.search.options(threshold, index)),
-            (None, None) => Err(Failure::Arguments(format!(
-                "{}: found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1",
-                pair.place
-            ))),
+            (None, None) => Err(pair.place.clone().error(Fault::NoThreshold)),
         }
     }
 
     /// What cannot be asked of such an input.
-    fn check(&self, is_lines: bool) -> Result<(), Failure> {
+    fn check(&self, is_several: bool) -> Result<(), Failure> {
+        self.search.check()?;
         let refuse = |what: &str| Err(Failure::Arguments(what.to_owned()));
-        match (is_lines, &self.third, &self.initial_pose, &self.known_direction) {
-            (true, Some(_), ..) => refuse("found JSON Lines and --third, expected one pair"),
-            (true, _, Some(_), _) => refuse("found JSON Lines and --initial-pose, expected one pair"),
+        match (is_several, &self.third, &self.initial_pose, &self.known_direction) {
+            (true, Some(_), ..) => refuse("found several pairs and --third, expected one pair"),
+            (true, _, Some(_), _) => refuse("found several pairs and --initial-pose, expected one pair"),
             (_, Some(_), Some(_), _) => refuse("found --third and --initial-pose, expected one of them"),
             (_, Some(_), _, Some(_)) => refuse("found --third and --known-direction, expected one of them"),
             _ => Ok(()),
@@ -224,9 +188,14 @@ impl Arguments {
     }
 }
 
-fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> Result<Estimated, Failure> {
+fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) -> Result<Estimated, Failure> {
     let usable = pair.usable();
-    let options = arguments.options(pair, index)?;
+    let options = match arguments.options(pair, index) {
+        Err(error) if is_several => {
+            return Ok(Estimated::unreadable(Unread { name: pair.name.clone(), error }));
+        }
+        options => options?,
+    };
     let third = arguments.third.as_deref().map(|file| third(arguments, file)).transpose()?;
     let start = Instant::now();
     let result = match (usable.error(), arguments.invalid) {
@@ -242,7 +211,7 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_lines: bool) -> R
         Ok((estimate, third)) => (found(pair, &estimate, third.as_ref(), elapsed_ms), None),
         Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
         // One pair of a file that has no pose is no reason to stop; a file that holds nothing else is bad input.
-        Err(EstimateError::Input(error)) if !(is_lines || matches!(error, InputError::Match { .. })) => {
+        Err(EstimateError::Input(error)) if !(is_several || matches!(error, InputError::Match { .. })) => {
             return Err(pair.refuse(error).into());
         }
         Err(error) => {
@@ -279,7 +248,7 @@ fn search(
 
 /// The matches of view 1 with a third view.
 fn third(arguments: &Arguments, file: &Path) -> Result<(Vec<Correspondence>, Options), Failure> {
-    let Some(pair) = arguments.input.open_file(file, arguments.output.quiet)?.next()? else {
+    let Some(pair) = arguments.input.open_other(file, arguments.output.quiet)?.next()? else {
         return Err(Failure::Arguments(format!("{}: found no pair, expected one", file.display())));
     };
     // Random numbers of its own.

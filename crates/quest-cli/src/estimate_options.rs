@@ -10,6 +10,7 @@ use quest_core::lanes::SearchScore;
 use quest_core::robust::{KnownDirection, Options};
 use quest_core::solver::SolverName;
 
+use crate::Failure;
 use crate::options::{loss_parser, solver_parser};
 
 /// What a subcommand takes where an option is not given.
@@ -65,6 +66,18 @@ pub(crate) struct EstimateOptions<D: Defaults> {
 }
 
 impl<D: Defaults> EstimateOptions<D> {
+    /// What contradicts itself.
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        let (least, most) = (self.min_iterations, self.max_iterations);
+        if least > most {
+            let found = format!(
+                "found --min-iterations {least} and --max-iterations {most}, expected no fewer at most"
+            );
+            return Err(Failure::Arguments(found));
+        }
+        Ok(())
+    }
+
     /// The options with this threshold, for bearings and for the pair of this number.
     pub(crate) fn options(&self, threshold: f64, index: u64) -> Options {
         // Without `..Options::default()`: an option that is new does not compile until it is read here.

@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let Some(pair) = input.next()? else {
         return Err(Failure::Arguments("found no pair, expected one".to_owned()));
     };
-    if input.is_lines() && input.next()?.is_some() {
+    if input.is_several() && input.next()?.is_some() {
         return Err(Failure::Arguments(format!("{}: found further pairs, expected one", pair.place)));
     }
     let matches = pair.correspondences()?;

@@ -39,11 +39,23 @@ pub(crate) struct OutputOptions {
     #[arg(long, value_enum, hide_default_value = true)]
     format: Option<Format>,
     /// Write the result to this file, whole or not at all.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = parse_output)]
     output: Option<PathBuf>,
     /// Say nothing on standard error but errors and why there is no pose.
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+/// A name whose extension is no promise that is not kept.
+fn parse_output(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match quest_io::Format::from_extension(&path) {
+        Some(quest_io::Format::Npy) => {
+            Err("results are not written as NumPy's arrays, expected .json, .jsonl, .csv or another name"
+                .to_owned())
+        }
+        _ => Ok(path),
+    }
 }
 
 impl OutputOptions {
@@ -59,6 +71,11 @@ impl OutputOptions {
         })
     }
 
+    /// The file of the result, where it is one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.output.as_deref()
+    }
+
     /// The target, found writable.
     pub(crate) fn open(&self) -> Result<Output, WriteError> {
         Output::open(self.output.as_deref().map(Path::new))
@@ -70,9 +87,20 @@ impl OutputOptions {
     }
 }
 
-/// `MODEL,width,height,params…` as a camera.
+/// `MODEL,width,height,params…` as a camera, or the camera in `FILE` or `FILE:ID`.
 pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
     const EXPECTED: &str = "expected MODEL,width,height,params such as PINHOLE,1024,768,1060,1060,514,384";
+    let of_file =
+        |path: &str, id| quest_io::read_camera(Path::new(path), id).map_err(|error| error.to_string());
+    if Path::new(text).exists() {
+        return of_file(text, None);
+    }
+    if let Some((path, id)) = text.rsplit_once(':').filter(|(path, _)| Path::new(path).exists()) {
+        return of_file(path, Some(id));
+    }
+    if !text.contains(',') {
+        return Err(format!("found no such file, {EXPECTED}, or the file of a camera"));
+    }
     let mut parts = text.split(',').map(str::trim);
     let (Some(model), Some(width), Some(height)) = (parts.next(), parts.next(), parts.next()) else {
         return Err(format!("found {} values, {EXPECTED}", text.split(',').count()));

@@ -19,9 +19,11 @@ use quest_io::{Pair, ReadError, SolveRecord};
 
 use crate::{
     Failure, Outcome, candidate_table,
-    input::InputOptions,
+    input::{InputsOptions, Unread},
     options::{OutputOptions, feasibility_parser, kinds_parser, solver_parser},
-    rows, words,
+    rows,
+    tally::{Refusal, Tally},
+    words,
     writer::{Record, Writer},
 };
 
@@ -31,8 +33,11 @@ Examples:
   quest-cli solve examples/points.json --all --kinds exact
   quest-cli solve examples/points.csv --format json
   quest-cli solve pixels.csv --camera1 PINHOLE,1024,768,1060,1060,514,384
+  quest-cli solve pixels.csv --camera1 calibration.yml --camera2 sparse/cameras.txt:2
   quest-cli solve - < pair.json
   quest-cli solve pairs.jsonl -o results.jsonl
+  quest-cli solve 'pairs/*.npz' more.csv folder -o results.jsonl
+  quest-cli solve points1.npy --points2 points2.npy
   quest-cli solve views12.json --third views13.json
   quest-cli solve pair.json --rotation 0.943,-0.110,-0.223,-0.221
 
@@ -42,13 +47,23 @@ Files:
      \"width\": 1024, \"height\": 768, \"params\": [1060, 1060, 514, 384]}, \"camera2\": {…},
      \"q_21\": […], \"t_21\": […]}
   JSON Lines: one such object a line.
-  CSV: the header u1,v1,u2,v2[,score], one match a row.
+  CSV: one match a row, u1,v1,u2,v2[,score], in this order or under a header with these names; separated by
+    commas, semicolons, tabs or blanks.
+  NumPy: .npy of N x 4 or N x 5 numbers; .npz of matches (such an array), or of x1 and x2 (N x 2 each), and of
+    scores if there are any.
+  Points of one image a file, CSV or .npy of N x 2: FILE --points2 FILE.
   Without cameras the points are on the plane z = 1.
+  Cameras: an argument MODEL,width,height,params by COLMAP's names and order, or a file. OpenCV's YAML and XML have
+    camera_matrix or K, distortion_coefficients or D, fisheye_model: 1 for a fisheye; ROS's camera_info has a
+    distortion_model; of several cameras FILE:ID takes K1 and D1 by ID 1, left: {K: .., D: ..} by ID left, and
+    COLMAP's by their numbers.
+  Several files, folders and patterns are read one after the other; the name of a file stands for the name
+  of a pair that has none.
 
 Results:
   X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.
   --format chooses the format. Without it the extension of -o does; without both, the
-  results of JSON Lines are JSON Lines, and others are a table.
+  results of several pairs are JSON Lines, and others are a table.
   With --third the candidate comes first whose depths in view 1 agree best with those of a candidate
   of views 1 and 3 (section 10.1). The files share the points whose u1, v1 are the same numbers.
   --feasibility theorem-2 lists the candidates that theorem 2 of the paper accepts: fewer, and none
@@ -56,19 +71,18 @@ Results:
   With --rotation nothing is solved for: the candidate is the translation and the depths that fit
   this rotation best (section 8), of two or more matches.
   Where the truth is known, JSON has the paper's metrics (61) and (62) in radians beside the errors.
-  Results of JSON Lines are written one by one up to the first bad line. With -o or with
-  --format json nothing is written if a line is bad.
+  No line and no file stops the others: one that cannot be read gets a record with its reason.
 
 Exit status:
-  0 an answer, 1 no pose could be found (of JSON Lines: for one or more of the pairs),
-  2 bad input or arguments.";
+  0 an answer, 1 no pose could be found (of several pairs: for one or more of them),
+  2 bad input or arguments (of several pairs: none of them could be read).";
 
 /// Candidate poses from five or more correct matches.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    input: InputOptions,
+    input: InputsOptions,
     /// The solver; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = SolverName::default().info().name, value_parser = solver_parser())]
     solver: SolverName,
@@ -95,41 +109,52 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut pairs = arguments.input.open(arguments.output.quiet)?;
-    let is_lines = pairs.is_lines();
-    if arguments.third.is_some() && is_lines {
-        return Err(Failure::Arguments("found JSON Lines and --third, expected one pair".to_owned()));
+    let mut pairs = arguments.input.open(&arguments.output)?;
+    let is_several = pairs.is_several();
+    if arguments.third.is_some() && is_several {
+        return Err(Failure::Arguments("found several pairs and --third, expected one pair".to_owned()));
     }
-    let mut writer = Writer::open(&arguments.output, is_lines)?;
-    let mut outcome = Outcome::Answer;
-    while let Some(pair) = pairs.next()? {
-        if let Outcome::NoPose = one_pair(arguments, &pair, is_lines, &mut writer)? {
-            outcome = Outcome::NoPose;
+    let mut writer = Writer::open(&arguments.output, is_several)?;
+    let mut tally = Tally::default();
+    while let Some(pair) = pairs.next().transpose() {
+        let solved = pair.map_err(Failure::from).and_then(|pair| one_pair(arguments, &pair, is_several));
+        let solved = match solved {
+            Err(Failure::Read(error)) => arguments.unreadable(pairs.alone(error)?),
+            solved => solved?,
+        };
+        writer.write(&solved.heading, solved.record, solved.focal_length)?;
+        tally.count(solved.refusal);
+        if let Some(note) = solved.note.filter(|_| !arguments.output.quiet) {
+            words::say("note", &note);
         }
     }
-    writer.finish(is_lines)?;
-    Ok(outcome)
+    writer.finish(is_several)?;
+    tally.outcome()
 }
 
-fn one_pair(
-    arguments: &Arguments,
-    pair: &Pair,
-    is_lines: bool,
-    writer: &mut Writer<SolveRecord>,
-) -> Result<Outcome, Failure> {
+/// The result of one pair.
+struct Solved {
+    heading: String,
+    record: SolveRecord,
+    focal_length: Option<f64>,
+    /// Why there is no pose.
+    refusal: Option<Refusal>,
+    /// What is not listed.
+    note: Option<String>,
+}
+
+fn one_pair(arguments: &Arguments, pair: &Pair, is_several: bool) -> Result<Solved, Failure> {
     let matches = arguments.matches(pair)?;
     let mut found = arguments.candidates(&matches);
-    // One degenerate pair among the lines of a file is no reason to stop; a file that holds nothing else is bad input.
-    if let (false, true, Some(degeneracy)) = (is_lines, found.is_empty(), found.degeneracy()) {
+    // One degenerate pair among several is no reason to stop; a file that holds nothing else is bad input.
+    if let (false, true, Some(degeneracy)) = (is_several, found.is_empty(), found.degeneracy()) {
         return Err(pair.refuse(InputError::Degenerate(degeneracy)).into());
     }
     let third_view = match &arguments.third {
         Some(file) => third_view::decide(arguments, file, (pair, &matches), &mut found)?,
         None => None,
     };
-    let solver =
-        if arguments.rotation.is_some() { given_rotation::NAME } else { arguments.solver.info().name };
-    let record = SolveRecord::new(pair.name.clone(), solver, &matches, &found, &pair.truth);
+    let record = SolveRecord::new(pair.name.clone(), arguments.solver_name(), &matches, &found, &pair.truth);
     let mut record = record.judged_by(arguments.feasibility, &found, &matches);
     record.third_view = third_view;
     if arguments.rotation.is_some() {
@@ -137,21 +162,16 @@ fn one_pair(
     }
     let hidden = if arguments.all { 0 } else { record.drop_unfeasible() };
     let heading = heading(pair, &record, found.degeneracy());
-    let is_empty = record.candidates.is_empty();
-    writer.write(&heading, record, pair.focal_length())?;
-
-    if is_empty {
-        return Ok(arguments.no_feasible_pose(pair, &found, matches.len()));
-    }
-    if hidden > 0 && !arguments.output.quiet {
+    let refusal = record.candidates.is_empty().then(|| arguments.refusal(pair, &found, matches.len()));
+    let note = (hidden > 0 && refusal.is_none()).then(|| {
         let what = if hidden == 1 { "candidate" } else { "candidates" };
         let why = match arguments.feasibility {
             Feasibility::PositiveDepth => "with points behind a camera",
             Feasibility::Theorem2 => "that theorem 2 rejects",
         };
-        words::say("note", &format!("{}: {hidden} {what} {why} not listed, --all lists them", pair.place));
-    }
-    Ok(Outcome::Answer)
+        format!("{}: {hidden} {what} {why} not listed, --all lists them", pair.place)
+    });
+    Ok(Solved { heading, record, focal_length: pair.focal_length(), refusal, note })
 }
 
 impl Arguments {
@@ -163,6 +183,17 @@ impl Arguments {
         }
     }
 
+    /// The record of a line or a file that is no pair, or has matches that cannot be solved.
+    fn unreadable(&self, Unread { name, error }: Unread) -> Solved {
+        let heading = words::one_line(&format!("{}: no pose", error.place));
+        let record = SolveRecord::unanswered(name, self.solver_name(), error.to_string());
+        Solved { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)), note: None }
+    }
+
+    fn solver_name(&self) -> &'static str {
+        if self.rotation.is_some() { given_rotation::NAME } else { self.solver.info().name }
+    }
+
     fn candidates(&self, matches: &[Correspondence]) -> Candidates {
         let mut found = Candidates::new();
         match self.rotation {
@@ -172,17 +203,14 @@ impl Arguments {
         found
     }
 
-    /// Says why no candidate is listed.
-    fn no_feasible_pose(&self, pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
+    /// Why no candidate is listed.
+    fn refusal(&self, pair: &Pair, found: &Candidates, matches: usize) -> Refusal {
         if self.feasibility == Feasibility::PositiveDepth || found.is_empty() {
-            return no_pose(pair, found, matches);
+            return refusal(pair, found, matches);
         }
         let count = found.len();
-        words::say(
-            "no pose",
-            &format!("{}: theorem 2 accepts none of the {count} candidates; --all lists them", pair.place),
-        );
-        Outcome::NoPose
+        let reason = format!("theorem 2 accepts none of the {count} candidates; --all lists them");
+        Refusal::NoPose(format!("{}: {reason}", pair.place))
     }
 }
 
@@ -203,8 +231,8 @@ fn at_least(pair: &Pair, needed: usize) -> Result<Vec<Correspondence>, ReadError
 /// Among more matches than that some are likely wrong.
 const OUTLIERS: usize = 20;
 
-/// Says why no candidate of a solver is shown.
-pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcome {
+/// Why no candidate of a solver is shown.
+pub(crate) fn refusal(pair: &Pair, found: &Candidates, matches: usize) -> Refusal {
     let why = match (found.iter().map(|c| c.in_front).max(), found.degeneracy()) {
         (Some(most), _) => format!(
             "none of the {} candidates has all {matches} points in front of both cameras, the best has {most}; --all \
@@ -219,8 +247,7 @@ pub(crate) fn no_pose(pair: &Pair, found: &Candidates, matches: usize) -> Outcom
         (None, Some(degeneracy)) => degeneracy.to_string(),
         (None, None) => "the solver found no candidate".to_owned(),
     };
-    words::say("no pose", &format!("{}: {why}", pair.place));
-    Outcome::NoPose
+    Refusal::NoPose(format!("{}: {why}", pair.place))
 }
 
 /// The line above the table.

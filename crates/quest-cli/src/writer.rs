@@ -46,7 +46,9 @@ impl<R: Record> Writer<R> {
         let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
         if format != Format::Jsonl || !is_lines {
             if resume {
-                let message = "found --resume, expected JSON Lines as input and as output with it".to_owned();
+                let message =
+                    "found --resume, expected several pairs as input and JSON Lines as output with it"
+                        .to_owned();
                 return Err(Failure::Arguments(message));
             }
             return Ok((Self::open(options, is_lines)?, 0));

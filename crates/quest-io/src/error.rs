@@ -83,7 +83,7 @@ pub enum Fault {
         most: u64,
     },
     /// There is nothing in it.
-    #[error("found an empty file, expected matches as JSON, JSON Lines or CSV")]
+    #[error("found an empty file, expected matches as JSON, JSON Lines, CSV or an array of NumPy's")]
     Empty,
     /// It is not text.
     #[error("found the byte 0x{0:02x}, expected UTF-8 text")]
@@ -95,25 +95,78 @@ pub enum Fault {
     #[error("{0}")]
     Csv(String),
     /// Two of the columns of a CSV file have the same name, or one is missing.
-    #[error("found the header {0:?}, expected u1,v1,u2,v2[,score]")]
-    Header(String),
-    /// A row of a CSV file is shorter or longer than its header.
-    #[error("found {found} values, expected {expected} as in the header")]
+    #[error("found the header {found:?}, expected {expected}, or rows of these without a header")]
+    Header {
+        /// The names of the columns.
+        found: String,
+        /// Those that were expected.
+        expected: &'static str,
+    },
+    /// A CSV file without a header has too many columns, or too few.
+    #[error("found {found} columns and no header, expected {expected}, or a header with these names")]
+    ColumnCount {
+        /// Columns in the first row.
+        found: usize,
+        /// Those that were expected.
+        expected: &'static str,
+    },
+    /// A row of a CSV file is shorter or longer than the first one.
+    #[error("found {found} values, expected {expected} as in the first row")]
     FieldCount {
         /// Values in the row.
         found: usize,
-        /// Columns in the header.
+        /// Columns in the first row.
         expected: usize,
     },
     /// A field of a CSV file is not a finite number.
     #[error("found {0:?}, expected a finite number")]
     NotANumber(String),
+    /// A field of a CSV file is a number with a comma.
+    #[error("found {0:?}, expected a number with a decimal point")]
+    DecimalComma(String),
+    /// An array of NumPy's has another form.
+    #[error("{message}, expected rows of {expected}")]
+    Array {
+        /// What was found.
+        message: String,
+        /// What a row was expected to be.
+        expected: &'static str,
+    },
+    /// A file of points where matches were expected.
+    #[error(
+        "found two columns, the points of one image, expected matches, or --points2 with those of the other image"
+    )]
+    OneImage,
+    /// Two files of points, one of each image, have different numbers of rows.
+    #[error("found {found} points, expected {expected} as in the file of the first image")]
+    PointCount {
+        /// Points of the second image.
+        found: usize,
+        /// Points of the first one.
+        expected: usize,
+    },
+    /// A file of this form has no rows of points.
+    #[error("found {0}, expected the points of one image as CSV or an array of NumPy's")]
+    NoPoints(&'static str),
     /// A coordinate of a match is NaN, infinite or missing, where all of them are needed.
     #[error("{0}")]
     Coordinate(String),
     /// A camera is not understood.
     #[error("{0}")]
     Camera(#[from] CameraError),
+    /// Points that are on no plane `z = 1`, and no camera.
+    #[error(
+        "these look like pixels: give --camera1 (points of the plane z = 1 that are so far out: --camera1 SIMPLE_PINHOLE,1,1,1,0,0)"
+    )]
+    Pixels,
+    /// An estimate without a camera does not know what noise is.
+    #[error(
+        "found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1"
+    )]
+    NoThreshold,
+    /// A file of cameras is of another form.
+    #[error("{0}")]
+    Calibration(String),
     /// The second camera is given, the first is not.
     #[error("found a second camera without the first, expected camera1 as well")]
     FirstCameraMissing,

@@ -13,6 +13,7 @@
 //!
 //! - [`read`] opens a file or standard input and yields [`Pair`]s. A bad file is a [`ReadError`]: one line with the place, what
 //!   was found and what was expected.
+//! - [`read_camera`] opens a calibration of OpenCV or ROS, or COLMAP's cameras.
 //! - [`SolveRecord`] and [`EstimateRecord`] are the results of a solve and of an estimate as they stand in files.
 //! - [`Output`] writes a file whole or not at all; [`write_json`] writes JSON for people.
 #![forbid(unsafe_code)]
@@ -21,18 +22,20 @@ mod camera;
 mod error;
 mod estimate_record;
 mod json_text;
+mod npz;
 mod output;
 mod pair;
 mod read;
 mod record;
 
-pub use camera::camera;
+pub use camera::{camera, read_camera};
 pub use error::{Fault, Place, ReadError};
 pub use estimate_record::{
     EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord, ThirdViewRecord,
 };
 pub use json_text::write_json;
+pub use npz::unpack_npz;
 pub use output::{Output, WriteError};
 pub use pair::{Gap, Pair, Truth};
-pub use read::{Format, FormatInfo, MOST_BYTES, Pairs, STANDARD_INPUT, read, read_within};
+pub use read::{Format, FormatInfo, MOST_BYTES, Pairs, STANDARD_INPUT, read, read_points, read_within};
 pub use record::{CandidateRecord, SolveRecord};

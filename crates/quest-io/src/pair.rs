@@ -93,6 +93,15 @@ impl Pair {
         }
     }
 
+    /// Whether there is no camera, and most matches are farther from the axis than a camera sees on the plane `z = 1`.
+    #[must_use]
+    pub fn looks_like_pixels(&self) -> bool {
+        /// A point there is 84 degrees off the axis.
+        const FAR: f64 = 10.0;
+        let far = self.matches.iter().filter(|row| row.iter().any(|x| x.abs() > FAR)).count();
+        self.cameras.is_none() && 2 * far > self.matches.len()
+    }
+
     /// The mean focal length of the two cameras in pixels, `None` without cameras.
     #[must_use]
     pub fn focal_length(&self) -> Option<f64> {

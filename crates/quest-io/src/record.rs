@@ -18,6 +18,9 @@ pub struct SolveRecord {
     pub solver: &'static str,
     /// How many matches were solved.
     pub matches: usize,
+    /// Why there is nothing but this: the pair could not be read, or its matches cannot be solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// Why the matches determine no pose, or only a part of one: a name of [`quest_core::Degeneracy`].
     pub degeneracy: Option<&'static str>,
     /// What decides whether a candidate is feasible, where it is not positive depth: a name of
@@ -81,10 +84,26 @@ impl SolveRecord {
             name,
             solver,
             matches: matches.len(),
+            reason: None,
             degeneracy: found.degeneracy().map(quest_core::Degeneracy::name),
             feasibility: None,
             third_view: None,
             candidates: found.iter().map(|c| CandidateRecord::new(c, matches, truth)).collect(),
+        }
+    }
+
+    /// The record of a pair that could not be read, or not be solved, and why.
+    #[must_use]
+    pub fn unanswered(name: Option<String>, solver: &'static str, reason: String) -> Self {
+        Self {
+            name,
+            solver,
+            matches: 0,
+            reason: Some(reason),
+            degeneracy: None,
+            feasibility: None,
+            third_view: None,
+            candidates: Vec::new(),
         }
     }
 

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! A [`Figure`] is a grid of [`Panel`]s; a panel has two [`Axis`] and some [`Series`], each with a direct label at its end.
-//! A [`Space`] is a scene in three dimensions whose parts are switched on and off. Series, and parts of a space, with the same
+//! A [`Space`] is a scene in three dimensions whose parts are switched on and off; it is also written as PLY. Series, and parts of a space, with the same
 //! name are one entry of the page's legend.
 #![forbid(unsafe_code)]
 
@@ -25,6 +25,7 @@ mod figure;
 mod html;
 mod label;
 mod page;
+mod ply;
 mod space;
 mod svg;
 

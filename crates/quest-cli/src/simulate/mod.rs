@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use quest_core::{
-    simulate::{Boxes, Figure, SceneOptions},
+    simulate::{Boxes, Figure, Layout, Motion, SceneOptions},
     solver::{Kinds, SolverName},
 };
 use quest_io::Output;
 
-use self::{record::Record, run::Run};
+use self::{pairs::Planted, record::Record, run::Run};
 use crate::{
     Failure, Outcome,
     options::{Format, OutputOptions, kinds_parser, solver_parser},
@@ -32,8 +32,9 @@ Examples:
   quest-cli simulate --figure 6 --solvers quest,nister --scenes realistic
   quest-cli simulate --table 1
   quest-cli simulate --figure 4 --points-box -1,1,-1,1,5,7 --translation-box 1,1,0.2
-  quest-cli simulate --pairs 100 --noise 0.75 -o scenes.jsonl
-  quest-cli solve scenes.jsonl
+  quest-cli simulate --pairs 100 --noise 0.75 -o scenes.jsonl && quest-cli solve scenes.jsonl
+  quest-cli simulate --pairs 1 --scenes realistic --points 200 --noise 0.5 --outliers 0.3 -o pair.json
+  quest-cli estimate pair.json
 
 Figures:
   4 noise, general points        5 noise, coplanar points      6 parallax
@@ -47,13 +48,16 @@ Readings (compare solvers only within one of them):
             solutions, and the rotation alone
   selected  the candidate that 30 further points of the scene choose, without the truth
 
---pairs writes scenes instead of solving them: JSON Lines that `solve` and `estimate` read, points
-on the plane z = 1 with the true pose, whose |t| is the parallax (63).
+--pairs writes scenes instead of solving them: JSON Lines, of one pair also JSON, that `solve`,
+`estimate` and `view` read: pixels, the camera of (60) and the true pose, whose |t| is the parallax (63).
 
 The same seed gives the same numbers on any number of threads. The times of table 1 are
 measured on one thread. ± is the 95 % confidence interval of the mean. \"ahead of\" counts the
 values at which a solver has smaller errors than the first solver at the same scenes: the 95 %
 confidence interval of the mean difference is below zero.";
+
+/// Options that `--pairs`, and those that belong to it, would ignore. clap does not ask for `--pairs` beside one of them.
+const OF_EXPERIMENTS: [&str; 7] = ["figure", "table", "plot", "trials", "solvers", "kinds", "threads"];
 
 /// The experiments of the paper's section 9: errors of the solvers on random scenes, and their times.
 #[derive(Args, Debug)]
@@ -90,13 +94,24 @@ pub(crate) struct Arguments {
     /// The largest absolute x, y and z of a translation.
     #[arg(long, value_name = "x,y,z", value_parser = boxes::translation, default_value = boxes::TRANSLATION)]
     translation_box: [f64; 3],
-    /// Write this many general scenes as pairs, and run nothing.
+    /// Write this many scenes as pairs, and run nothing.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000_000),
-        conflicts_with_all = ["figure", "table", "plot", "trials"])]
+        conflicts_with_all = OF_EXPERIMENTS)]
     pairs: Option<u32>,
     /// Standard deviation of the noise of these pairs, in pixels of the camera (60).
-    #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "pairs")]
+    #[arg(long, value_name = "PX", default_value_t = 0.0, requires = "pairs",
+        conflicts_with_all = OF_EXPERIMENTS)]
     noise: f64,
+    /// The share of these pairs' matches whose point in view 2 is anywhere in the image instead.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, requires = "pairs", value_parser = pairs::parse_share,
+        allow_negative_numbers = true, conflicts_with_all = OF_EXPERIMENTS)]
+    outliers: f64,
+    /// The parallax of these pairs, from 0 (a rotation alone) to 1 [default: that of a random motion].
+    #[arg(long, value_name = "P", requires = "pairs", allow_negative_numbers = true, conflicts_with_all = OF_EXPERIMENTS)]
+    parallax: Option<f64>,
+    /// Put the points of these pairs on a plane.
+    #[arg(long, requires = "pairs", conflicts_with_all = OF_EXPERIMENTS)]
+    coplanar: bool,
     /// Round pixels to whole numbers after the noise. Table 1 always does, as in the paper.
     #[arg(long)]
     rounded: bool,
@@ -144,14 +159,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let format = arguments.output.format(Format::Table);
     let mut output = arguments.output.open()?;
     if let Some(count) = arguments.pairs {
-        let options = SceneOptions { noise_px: arguments.noise, ..arguments.base() };
-        if arguments.output.format(Format::Jsonl) != Format::Jsonl {
-            return Err(Failure::Arguments(
-                "--pairs writes JSON Lines, expected --format jsonl or a name that ends with .jsonl"
-                    .to_owned(),
-            ));
-        }
-        pairs::write(&mut output, &options, arguments.seed, count)?;
+        let planted = Planted {
+            scenes: arguments.planted(),
+            outliers: arguments.outliers,
+            seed: arguments.seed,
+            count,
+        };
+        pairs::write(&mut output, &planted, arguments.output.format(Format::Jsonl))?;
         output.finish()?;
         return Ok(Outcome::Answer);
     }
@@ -160,6 +174,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         None => None,
     };
     let run = arguments.plan()?;
+    if plot.is_some() && run.figures.is_empty() {
+        return Err(Failure::Arguments(
+            "found --plot and --table alone, expected a --figure to draw".to_owned(),
+        ));
+    }
     let records = run.execute()?;
     output.write(|w| match format {
         Format::Table => write!(w, "{}", summary::text(&run, &records)),
@@ -185,6 +204,17 @@ impl Arguments {
         };
         let boxes = Boxes { points: self.points_box, translation: self.translation_box };
         SceneOptions { points: usize::from(self.points), rounded: self.rounded, boxes, ..base }
+    }
+
+    /// The scenes of pairs.
+    fn planted(&self) -> SceneOptions {
+        let base = self.base();
+        SceneOptions {
+            noise_px: self.noise,
+            motion: self.parallax.map_or(base.motion, Motion::Parallax),
+            layout: if self.coplanar { Layout::Coplanar } else { base.layout },
+            ..base
+        }
     }
 
     fn plan(&self) -> Result<Run, Failure> {

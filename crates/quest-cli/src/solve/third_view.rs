@@ -24,7 +24,7 @@ pub(super) fn decide(
     (pair, matches): (&Pair, &[Correspondence]),
     found: &mut Candidates,
 ) -> Result<Option<ThirdViewRecord>, Failure> {
-    let Some(other) = arguments.input.open_file(file, arguments.output.quiet)?.next()? else {
+    let Some(other) = arguments.input.open_other(file, arguments.output.quiet)?.next()? else {
         return Err(Failure::Arguments(format!("{}: found no pair, expected one", file.display())));
     };
     let other_matches = arguments.matches(&other)?;

@@ -1,4 +1,4 @@
-//! `quest-cli view --estimate`: one pose from matches with outliers, as a page.
+//! `quest-cli view --estimate`: one pose from matches with outliers, as a page or as PLY.
 
 use nalgebra::{Matrix3, Vector3};
 use quest_core::robust::{self, Estimate, EstimateError, Options, Priors};
@@ -15,11 +15,11 @@ const OUTLIER: Colour = Colour(0xd6, 0x1f, 0x3a);
 /// What counts as zero on the logarithmic axis of residuals, in radians.
 const ROUNDING: f64 = 1e-17;
 
-/// The page; `None` where no pose explains the matches, of which is told.
+/// The page, or PLY; `None` where no pose explains the matches, of which is told.
 ///
 /// # Errors
 /// Matches or options that are unusable.
-pub(super) fn html(pair: &Pair, options: &Options) -> Result<Option<String>, Failure> {
+pub(super) fn text(pair: &Pair, options: &Options, is_ply: bool) -> Result<Option<String>, Failure> {
     let matches = pair.correspondences()?;
     let priors = Priors { scores: pair.scores.as_deref(), ..Priors::default() };
     let found = match robust::estimate_with(&matches, options, &priors) {
@@ -31,6 +31,9 @@ pub(super) fn html(pair: &Pair, options: &Options) -> Result<Option<String>, Fai
             return Ok(None);
         }
     };
+    if is_ply {
+        return Ok(Some(space(pair, &matches, &found).to_ply()));
+    }
     let title = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
     let introduction = format!(
         "{} of {} matches agree with one pose, X2 = R X1 + t. The mean absolute depth over both views is 1, so |t| is the parallax.",

@@ -13,7 +13,8 @@ fn refused(file: &str, text: impl AsRef<[u8]>, expected: &str) {
 
 #[test]
 fn files_without_text() {
-    let nothing = "found an empty file, expected matches as JSON, JSON Lines or CSV";
+    let nothing = "found an empty file, expected matches as JSON, JSON Lines, CSV or an array of NumPy's";
+    refused("a.npy", "", &format!("a.npy: {nothing}"));
     for file in ["a.json", "a.jsonl", "a.csv", "a.txt"] {
         refused(file, "", &format!("{file}: {nothing}"));
         refused(file, " \n\n", &format!("{file}: {nothing}"));
@@ -26,7 +27,7 @@ fn files_without_text() {
 fn what_is_not_a_file() {
     let directory = tempfile::tempdir().unwrap();
     fs::create_dir(directory.path().join("d.json")).unwrap();
-    let run = run_in(directory.path(), &["solve", "d.json"], b"");
+    let run = run_in(directory.path(), &["view", "d.json", "-o", "v.html"], b"");
     assert_eq!((run.status, run.stderr.as_str()), (2, "error: d.json: found a directory, expected a file\n"));
     let run = run_in(directory.path(), &["solve", "no.json"], b"");
     assert_eq!(run.stderr, "error: no.json: cannot be read: No such file or directory\n");
@@ -107,14 +108,14 @@ fn cameras_that_are_not_understood() {
 
 #[test]
 fn csv() {
-    let header = "expected u1,v1,u2,v2[,score]";
-    refused("a.csv", "1,2,3,4\n", &format!("a.csv:1: found the header \"1,2,3,4\", {header}"));
+    let header = "expected u1,v1,u2,v2[,score], or rows of these without a header";
+    refused("a.csv", "x,y,z,w\n", &format!("a.csv:1: found the header \"x,y,z,w\", {header}"));
     refused("a.csv", "u1,v1,u2,u2\n", &format!("a.csv:1: found the header \"u1,v1,u2,u2\", {header}"));
     for text in ["NaN", "-inf", "1e400", "x", ""] {
         let message = format!("a.csv:3: u2: found {text:?}, expected a finite number");
         refused("a.csv", format!("u1,v1,u2,v2\n1,2,3,4\n1,2,{text},4\n"), &message);
     }
-    let short = "a.csv:3: found 3 values, expected 4 as in the header";
+    let short = "a.csv:3: found 3 values, expected 4 as in the first row";
     refused("a.csv", "u1,v1,u2,v2\n\n1,2,3\n", short);
     refused("a.csv", "u1,v1,u2,v2\r\n1,2,3,4\r\n1,2,3\r\n", short);
     refused("a.csv", "u1,v1,u2,v2\n \n1,2,3\n", short);

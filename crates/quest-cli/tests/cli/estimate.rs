@@ -316,7 +316,7 @@ fn an_initial_pose_needs_no_sample() {
     let line = pair.to_string() + "\n";
     let arguments = ["estimate", "-", "--input-format", "jsonl", "--initial-pose", "1,0,0,0,1,0,0"];
     let run = run_in(Path::new("."), &arguments, line.as_bytes());
-    assert!(run.status == 2 && run.stderr.contains("JSON Lines and --initial-pose"), "{}", run.stderr);
+    assert!(run.status == 2 && run.stderr.contains("several pairs and --initial-pose"), "{}", run.stderr);
 }
 
 #[test]

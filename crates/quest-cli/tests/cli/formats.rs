@@ -54,21 +54,28 @@ fn json_lines_give_a_line_each() {
 }
 
 #[test]
-fn results_before_a_bad_line_are_written() {
+fn a_bad_line_costs_itself_alone() {
     let lines = format!("{}\n\n{{\"matches\": [[1, 2, 3]]}}\n{}\n", pair(""), pair(""));
     let run = run_in(Path::new("."), &["solve", "-", "--quiet"], lines.as_bytes());
-    assert_eq!((run.status, run.stdout.lines().count()), (2, 1));
-    let error = "error: standard input:3:22: matches[0]: found 3 numbers, expected 4";
-    assert_eq!(run.stderr.lines().last(), Some(error));
+    assert_eq!((run.status, run.stdout.lines().count()), (1, 3));
+    let reason = "standard input:3:22: matches[0]: found 3 numbers, expected 4";
+    assert_eq!(run.stderr, format!("no pose: {reason}\n"));
+    let records: Vec<serde_json::Value> =
+        run.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((&records[1]["reason"], &records[1]["candidates"]), (&reason.into(), &serde_json::json!([])));
+    assert_eq!(records[0], records[2]);
+    // Where nothing could be read it is bad input.
+    let none = run_in(Path::new("."), &["solve", "-", "--input-format", "jsonl"], b"{}\n{\n");
+    assert_eq!(none.status, 2, "{}", none.stderr);
 }
 
 #[test]
 fn unknown_keys_are_named_once() {
-    let keys = ", \"source\": 1, \"camera1\": {\"model\": \"PINHOLE\", \"params\": [1, 1, 0, 0], \"fov\": 3}";
+    let keys = ", \"source\": 1, \"colour\": 1, \"camera1\": {\"model\": \"PINHOLE\", \"params\": [1, 1, 0, 0], \"fov\": 3}";
     let lines = format!("{}\n{}\n", pair(keys), pair(keys));
     let words = run_in(Path::new("."), &["solve", "-"], lines.as_bytes()).stderr;
     let warnings: Vec<_> = words.lines().filter(|l| l.starts_with("warning:")).collect();
-    assert_eq!(warnings, ["warning: standard input:1: ignored unknown keys: source, camera1.fov"]);
+    assert_eq!(warnings, ["warning: standard input:1: ignored unknown keys: colour, camera1.fov"]);
     let quiet = run_in(Path::new("."), &["solve", "-", "--quiet"], lines.as_bytes());
     assert!(!quiet.stderr.contains("warning") && !quiet.stderr.contains("note"), "{}", quiet.stderr);
 }

@@ -9,6 +9,8 @@ mod faults;
 mod formats;
 mod instructions;
 mod lines;
+mod many_files;
+mod numpy;
 mod output;
 mod polynomials;
 mod readme;
@@ -16,6 +18,7 @@ mod replay;
 mod servo;
 mod shell;
 mod simulate;
+mod tables;
 mod view;
 
 use std::{

@@ -33,10 +33,38 @@ fn the_extension_of_the_file_decides_the_format() {
 }
 
 #[test]
+fn the_shipped_examples_print_no_warnings() {
+    for (command, file, more) in [
+        ("solve", "points.json", &["--all"][..]),
+        ("solve", "points.csv", &["--all"]),
+        ("solve", "tiny_berlin_7in.json", &["--all"]),
+        ("estimate", "tumfr3_98072_98172.json", &[]),
+        ("estimate", "hololens_00011_00015.json", &[]),
+    ] {
+        let run = run(&[&[command, &example(file)], more].concat());
+        assert_eq!((run.status, run.stderr.as_str()), (0, ""), "{command} {file}");
+    }
+}
+
+#[test]
+fn what_would_have_no_effect_is_an_error() {
+    let (points, pair) = (example("points.json"), example("tumfr3_98072_98172.json"));
+    for (arguments, words) in [
+        (&["estimate", &pair, "--min-iterations", "20", "--max-iterations", "10"][..], "--max-iterations 10"),
+        (&["solve", &points, "-o", "out.npz"], "results are not written as NumPy's arrays"),
+        (&["solve", &points, "--rotation", "1,0,0,0", "--solver", "nister"], "cannot be used with"),
+        (&["estimate", &pair, "-o", "out.json", "--resume"], "found --resume"),
+        (&["estimate", &pair, &pair, "--initial-pose", "1,0,0,0,0,0,1"], "several pairs and --initial-pose"),
+    ] {
+        let run = run(arguments);
+        assert!(run.status == 2 && run.stderr.contains(words), "{arguments:?}: {}", run.stderr);
+    }
+}
+
+#[test]
 fn an_existing_file_survives_a_failure() {
     let directory = directory_with("out.json", "kept");
-    let lines = format!("{{\"matches\": {}}}\n{{\"matches\": [[1", five_matches());
-    let run = run_in(directory.path(), &["solve", "-", "-o", "out.json"], lines.as_bytes());
+    let run = run_in(directory.path(), &["solve", "-", "-o", "out.json"], b"{\"matches\": [[1");
     assert_eq!(run.status, 2, "{}", run.stderr);
     assert_eq!(fs::read_to_string(directory.path().join("out.json")).unwrap(), "kept");
     assert_eq!(files(directory.path()), ["out.json"]);

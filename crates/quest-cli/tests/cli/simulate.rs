@@ -143,10 +143,67 @@ fn scenes_are_pairs_that_solve_reads() {
         &["--translation-box", "0,0,0"],
         &["--figure", "4"],
         &["--format", "csv"],
+        &["--format", "json"],
+        &["--outliers", "1.5"],
+        &["--parallax", "-0.1"],
+        // Without effect.
+        &["--threads", "2"],
+        &["--solvers", "quest"],
+        &["--kinds", "all"],
     ];
     for wrong in impossible {
         let refused = run(&[&arguments[..], wrong].concat());
         assert!(refused.status == 2 && !refused.stderr.is_empty(), "{wrong:?} {}", refused.stderr);
     }
-    assert_eq!(run(&["simulate", "--noise", "1"]).status, 2);
+    for alone in [&["--noise", "1"][..], &["--outliers", "0.1"], &["--parallax", "0.1"], &["--coplanar"]] {
+        assert_eq!(run(&[&["simulate"], alone].concat()).status, 2, "{alone:?}");
+        let beside = run(&[&["simulate", "--figure", "4", "--trials", "1"], alone].concat());
+        assert_eq!(beside.status, 2, "{alone:?}");
+    }
+}
+
+#[test]
+fn a_plot_of_no_figure_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = run_in(folder.path(), &["simulate", "--table", "1", "--trials", "1", "--plot", "a.svg"], b"");
+    assert!(run.status == 2 && run.stderr.contains("expected a --figure to draw"), "{}", run.stderr);
+    assert!(!folder.path().join("a.svg").exists());
+}
+
+#[test]
+fn a_planted_pair_is_estimated() {
+    let folder = tempfile::tempdir().unwrap();
+    let planted = [
+        "simulate",
+        "--pairs",
+        "1",
+        "--scenes",
+        "realistic",
+        "--points",
+        "200",
+        "--noise",
+        "0.5",
+        "-o",
+        "a.json",
+    ];
+    let estimated = |more: &[&str]| {
+        let run = run_in(folder.path(), &[&planted[..], more].concat(), b"");
+        assert_eq!((run.status, run.stdout.as_str(), run.stderr.as_str()), (0, "", ""));
+        // The camera gives the threshold its unit.
+        let run = run_in(folder.path(), &["estimate", "a.json", "--format", "json"], b"");
+        assert_eq!((run.status, run.stderr.as_str()), (0, ""));
+        serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap()
+    };
+    let found = estimated(&["--outliers", "0.4", "--parallax", "0.2"]);
+    assert!(found["rotation_error_deg"].as_f64().unwrap() < 0.2, "{found}");
+    assert!((found["parallax"].as_f64().unwrap() - 0.2).abs() < 0.05, "{}", found["parallax"]);
+    let inliers = found["inlier_count"].as_u64().unwrap();
+    assert!((90..=126).contains(&inliers), "{inliers} of 120 with the threshold at two deviations");
+    let pair: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    assert_eq!(pair["camera1"]["params"], serde_json::json!([1060.0, 1060.0, 514.0, 384.0]));
+    let t = pair["t_21"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap().powi(2)).sum::<f64>().sqrt();
+    assert!((t - 0.2).abs() < 1e-9, "{t}");
+    assert_eq!(estimated(&["--coplanar"])["model"], "planar");
+    assert_eq!(estimated(&["--parallax", "0"])["model"], "pure_rotation");
 }

@@ -170,6 +170,43 @@ fn spheres_and_cameras_in_space_are_shown_in_a_browser() {
 }
 
 #[test]
+fn cameras_and_points_become_ply() {
+    let directory = tempfile::tempdir().unwrap();
+    let ply = |arguments: &[&str]| {
+        let run = run_in(directory.path(), &[&["view", "-o", "scene.ply"], arguments].concat(), b"");
+        assert_eq!((run.status, run.stdout.as_str(), run.stderr.as_str()), (0, "", ""));
+        fs::read_to_string(directory.path().join("scene.ply")).unwrap()
+    };
+    let count = |text: &str, what: &str| -> usize {
+        let line = text.lines().find(|line| line.starts_with(&format!("element {what}"))).unwrap();
+        line.rsplit(' ').next().unwrap().parse().unwrap()
+    };
+    let points = ply(&[&example("points.json")]);
+    let (header, body) = points.split_once("end_header\n").unwrap();
+    assert!(header.starts_with("ply\nformat ascii 1.0\n"), "{header}");
+    let (vertices, edges) = (count(header, "vertex"), count(header, "edge"));
+    assert_eq!(body.lines().count(), vertices + edges);
+    assert!(body.lines().take(vertices).all(|line| line.split(' ').count() == 6));
+    // The five points of the true pose are among the vertices; a depth is that of the candidate shown.
+    let solved = run(&["solve", &example("points.json"), "--format", "json", "--quiet"]).stdout;
+    let solved: serde_json::Value = serde_json::from_str(&solved).unwrap();
+    let depths = solved["candidates"][0]["depths1"].as_array().unwrap();
+    for depth in depths.iter().map(|z| z.as_f64().unwrap()) {
+        let is_it =
+            |line: &str| (line.split(' ').nth(2).unwrap().parse::<f64>().unwrap() - depth).abs() < 1e-9;
+        assert!(body.lines().take(vertices).any(is_it), "{depth}");
+    }
+    let estimate = ply(&[&example("tumfr3_98072_98172.json"), "--estimate"]);
+    assert!(count(&estimate, "vertex") > 300, "{}", &estimate[..400]);
+    let other = run(&["view", &example("points.json"), "-o", "scene.obj"]);
+    assert!(
+        other.status == 2 && other.stderr.contains("a name that ends with .html or .ply"),
+        "{}",
+        other.stderr
+    );
+}
+
+#[test]
 fn without_a_pose_there_is_no_page() {
     let directory = tempfile::tempdir().unwrap();
     let line = "[[0,0,0,0],[0.1,0,0.1,0],[0.2,0,0.2,0],[0.3,0,0.3,0],[0.4,0,0.5,0]]";

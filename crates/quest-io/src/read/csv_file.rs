@@ -1,58 +1,146 @@
-//! CSV: the header `u1,v1,u2,v2[,score]`, one match a row.
+//! CSV: one match or one point a row, under a header or without one, separated by commas, semicolons, tabs or blanks.
 //!
-//! A coordinate that is NaN, infinite or an empty field makes its match one without a bearing.
+//! A coordinate that is NaN, infinite or an empty field makes its match one without a bearing. Lines that begin with `#` are
+//! comments; the first one may be the header, as NumPy's `savetxt` writes it.
+
+use std::borrow::Cow;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::{
-    Gap, Pair,
-    error::{Fault, Place, ReadError},
-};
+use super::table::{Columns, Rows};
+use crate::error::{Fault, Place, ReadError};
 
-const COLUMNS: [&str; 4] = ["u1", "v1", "u2", "v2"];
-const SCORE: &str = "score";
+const COMMENT: char = '#';
 
-/// The pair in `text`. Columns are found by name, in any order.
-pub(crate) fn parse(place: &Place, text: &str) -> Result<Pair, ReadError> {
-    let mut reader = ReaderBuilder::new().flexible(true).trim(Trim::All).from_reader(text.as_bytes());
+/// The rows in `text`. Under a header columns are found by name, in any order.
+pub(super) fn parse<const N: usize>(
+    place: &Place,
+    text: &str,
+    columns: &Columns<N>,
+) -> Result<Rows<N>, ReadError> {
+    let separator = separator(text);
+    let text = &*plain(text, separator, columns);
+    let mut reader = ReaderBuilder::new();
+    reader.flexible(true).trim(Trim::All).has_headers(false).delimiter(separator);
+    let mut reader = reader.from_reader(text.as_bytes());
+    let mut records = reader.records().filter(|row| !row.as_ref().is_ok_and(is_blank)).peekable();
     // The text is UTF-8 and rows may have any length: there is nothing left that the parser could refuse.
     let csv_error = |e: &csv::Error| place.clone().error(Fault::Csv(e.to_string()));
-    let header = reader.headers().map_err(|e| csv_error(&e))?.clone();
-    let (columns, score) = columns(&header)
-        .ok_or_else(|| place.at_line(1).error(Fault::Header(header.iter().collect::<Vec<_>>().join(","))))?;
 
-    let mut pair = Pair {
-        place: place.clone(),
-        scores: score.map(|_| Vec::new()),
-        unknown_keys: header.iter().filter(|c| !known(c)).map(str::to_owned).collect(),
-        ..Pair::default()
+    let first = match records.peek() {
+        Some(Ok(row)) => row.clone(),
+        Some(Err(error)) => return Err(csv_error(error)),
+        None => return Err(place.clone().error(Fault::Empty)),
     };
-    for row in reader.records() {
+    let here = || place.at_line(line(text, &first));
+    let is_headless = first.iter().any(is_number) && first.iter().all(|f| f.is_empty() || is_number(f));
+    let found = if is_headless {
+        Found::in_order(first.len(), columns).map_err(|fault| here().error(fault))?
+    } else {
+        records.next();
+        Found::by_name(&first, columns).map_err(|fault| here().error(fault))?
+    };
+
+    let mut rows = Rows::new(found.score.is_some(), found.unknown);
+    for row in records {
         let row = row.map_err(|e| csv_error(&e))?;
-        if row.len() == 1 && row[0].is_empty() {
-            continue;
-        }
         let refuse = |(key, fault): Refusal| {
             let here = place.at_line(line(text, &row));
             Place { key: key.map(str::to_owned), ..here }.error(fault)
         };
-        if row.len() != header.len() {
-            return Err(refuse((None, Fault::FieldCount { found: row.len(), expected: header.len() })));
+        if row.len() != first.len() {
+            return Err(refuse((None, Fault::FieldCount { found: row.len(), expected: first.len() })));
         }
-        let mut values = [0.0; 4];
-        for ((value, column), name) in values.iter_mut().zip(columns).zip(COLUMNS) {
+        let mut values = [0.0; N];
+        for ((value, column), name) in values.iter_mut().zip(found.columns).zip(columns.names) {
             *value = coordinate(name, &row[column]).map_err(refuse)?;
-            if value.is_nan() && pair.first_gap.is_none() {
-                let error = refuse((Some(name), Fault::NotANumber(row[column].to_owned())));
-                pair.first_gap = Some(Gap { message: error.fault.to_string(), place: error.place });
-            }
         }
-        pair.matches.push(values);
-        if let (Some(scores), Some(column)) = (&mut pair.scores, score) {
-            scores.push(number(SCORE, &row[column]).map_err(refuse)?);
+        rows.push(values, |k| {
+            refuse((Some(columns.names[k]), Fault::NotANumber(row[found.columns[k]].to_owned())))
+        });
+        if let (Some(scores), Some((name, column))) = (&mut rows.scores, found.score) {
+            scores.push(number(name, &row[column]).map_err(refuse)?);
         }
     }
-    Ok(pair)
+    Ok(rows)
+}
+
+/// What separates the fields of the first line that is not blank.
+fn separator(text: &str) -> u8 {
+    let line = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default().trim();
+    // A comma beside one of the others is a decimal comma, which is refused with the field it stands in.
+    b";\t,".iter().copied().find(|&s| line.as_bytes().contains(&s)).unwrap_or(b' ')
+}
+
+/// The text without comments, blanks in a row as one where they separate fields. Lines stay where they are.
+fn plain<'a, const N: usize>(text: &'a str, separator: u8, columns: &Columns<N>) -> Cow<'a, str> {
+    if separator != b' ' && !text.contains(COMMENT) {
+        return Cow::Borrowed(text);
+    }
+    let mut is_first = true;
+    let mut lines = String::with_capacity(text.len());
+    for line in text.lines() {
+        let comment = line.trim_start().strip_prefix(COMMENT);
+        let names = |header: &str| {
+            let fields: Vec<_> = header.split(char::from(separator)).map(str::trim).collect();
+            columns.names.iter().all(|name| fields.contains(name))
+        };
+        let line = match comment {
+            Some(header) if is_first && names(header) => header,
+            Some(_) => "",
+            None => line,
+        };
+        is_first &= comment.is_none() && line.trim().is_empty();
+        if separator == b' ' {
+            lines.extend(line.split_whitespace().flat_map(|field| [field, " "]));
+            lines.truncate(lines.trim_end_matches(' ').len());
+        } else {
+            lines.push_str(line);
+        }
+        lines.push('\n');
+    }
+    Cow::Owned(lines)
+}
+
+/// Where the coordinates and the score stand.
+struct Found<const N: usize> {
+    columns: [usize; N],
+    score: Option<(&'static str, usize)>,
+    unknown: Vec<String>,
+}
+
+impl<const N: usize> Found<N> {
+    /// Without a header: in the order of the names.
+    fn in_order(count: usize, columns: &Columns<N>) -> Result<Self, Fault> {
+        columns.check(count, || Fault::ColumnCount { found: count, expected: columns.expected })?;
+        let score = columns.score.filter(|_| count > N).map(|name| (name, N));
+        Ok(Self { columns: std::array::from_fn(|k| k), score, unknown: Vec::new() })
+    }
+
+    /// By the names in a header: each of them once, the score at most once.
+    fn by_name(header: &StringRecord, columns: &Columns<N>) -> Result<Self, Fault> {
+        let refuse = || Fault::Header {
+            found: header.iter().collect::<Vec<_>>().join(","),
+            expected: columns.expected,
+        };
+        let find = |name: &str| {
+            let mut places = header.iter().enumerate().filter(|(_, column)| *column == name).map(|(k, _)| k);
+            (places.next(), places.next())
+        };
+        let mut places = [0; N];
+        for (place, name) in places.iter_mut().zip(columns.names) {
+            let (Some(k), None) = find(name) else { return Err(refuse()) };
+            *place = k;
+        }
+        let score = match columns.score.map(|name| (name, find(name))) {
+            Some((_, (_, Some(_)))) => return Err(refuse()),
+            Some((name, (Some(k), None))) => Some((name, k)),
+            _ => None,
+        };
+        let is_known = |name: &str| columns.names.contains(&name) || columns.score == Some(name);
+        let unknown = header.iter().filter(|name| !is_known(name)).map(str::to_owned).collect();
+        Ok(Self { columns: places, score, unknown })
+    }
 }
 
 /// The error of a row, with its column if it concerns one.
@@ -67,27 +155,13 @@ fn line(text: &str, row: &StringRecord) -> usize {
     text[..(end + blank).min(text.len())].split(|&b| b == b'\n').count()
 }
 
-fn known(column: &str) -> bool {
-    COLUMNS.contains(&column) || column == SCORE
+fn is_blank(row: &StringRecord) -> bool {
+    row.len() == 1 && row[0].is_empty()
 }
 
-/// The columns of the coordinates and of the score; `None` if a coordinate is missing or a column appears twice.
-fn columns(header: &StringRecord) -> Option<([usize; 4], Option<usize>)> {
-    let find = |name: &str| {
-        let mut places = header.iter().enumerate().filter(|(_, column)| *column == name).map(|(k, _)| k);
-        (places.next(), places.next())
-    };
-    let mut columns = [0; 4];
-    for (column, name) in columns.iter_mut().zip(COLUMNS) {
-        *column = match find(name) {
-            (Some(k), None) => k,
-            _ => return None,
-        };
-    }
-    match find(SCORE) {
-        (score, None) => Some((columns, score)),
-        _ => None,
-    }
+/// Whether a field is one of a row, not of a header: also with a decimal comma.
+fn is_number(field: &str) -> bool {
+    field.replace(',', ".").parse::<f64>().is_ok()
 }
 
 /// A coordinate; NaN where it is infinite, NaN or missing. Tables write a missing number as an empty field.
@@ -96,11 +170,21 @@ fn coordinate(column: &'static str, field: &str) -> Result<f64, Refusal> {
         Ok(value) if value.is_finite() => Ok(value),
         Ok(_) => Ok(f64::NAN),
         Err(_) if field.is_empty() => Ok(f64::NAN),
-        Err(_) => Err((Some(column), Fault::NotANumber(field.to_owned()))),
+        Err(_) => Err((Some(column), unreadable(field))),
     }
 }
 
 fn number(column: &'static str, field: &str) -> Result<f64, Refusal> {
     let value = field.parse::<f64>().ok().filter(|v| v.is_finite());
-    value.ok_or_else(|| (Some(column), Fault::NotANumber(field.to_owned())))
+    value.ok_or_else(|| (Some(column), unreadable(field)))
+}
+
+/// Why a field is no number. `1,234` may be 1.234 or 1234: a decimal comma is not guessed.
+fn unreadable(field: &str) -> Fault {
+    let found = field.to_owned();
+    if field.contains(',') && is_number(field) {
+        Fault::DecimalComma(found)
+    } else {
+        Fault::NotANumber(found)
+    }
 }

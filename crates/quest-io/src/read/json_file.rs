@@ -21,6 +21,9 @@ use crate::{
 /// How far from 1 the length of a true quaternion may be: four written decimals stay within it.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
+/// Keys that tell people where a pair comes from and what is known of it.
+const FOR_PEOPLE: [&str; 3] = ["source", "scene", "inliers_known"];
+
 /// A pair with matches of the form `M`.
 #[derive(Deserialize)]
 struct PairFile<M> {
@@ -126,7 +129,10 @@ fn read<M: DeserializeOwned>(place: &Place, text: &str) -> Result<(PairFile<M>, 
     let tracked = serde_path_to_error::Deserializer::new(&mut json, &mut track);
     let file: Result<Object<PairFile<M>>, _> = serde_ignored::deserialize(tracked, |path| {
         // serde_ignored writes `camera1.?.k` for a key of an optional object.
-        unknown_keys.push(path.to_string().replace(".?", ""));
+        let key = path.to_string().replace(".?", "");
+        if !FOR_PEOPLE.contains(&key.as_str()) {
+            unknown_keys.push(key);
+        }
     });
     let file = file.map_err(|e| json_words::error(place, text, &track.path().to_string(), &e))?;
     json.end().map_err(|e| json_words::error(place, text, ".", &e))?;

@@ -5,6 +5,8 @@ mod csv_file;
 mod gaps;
 mod json_file;
 mod json_words;
+mod npy_file;
+mod table;
 
 use std::{
     fs::File,
@@ -13,6 +15,7 @@ use std::{
     path::Path,
 };
 
+use self::table::{Columns, MATCHES, POINTS, Rows};
 use crate::{
     Pair,
     error::{Fault, Place, ReadError},
@@ -32,6 +35,8 @@ pub enum Format {
     JsonLines,
     /// `u1,v1,u2,v2[,score]`, one match a row: one pair.
     Csv,
+    /// An array of NumPy's, or an archive of them: one pair.
+    Npy,
 }
 
 /// What is told of a form.
@@ -47,7 +52,7 @@ pub struct FormatInfo {
 
 impl Format {
     /// Every form.
-    pub const ALL: [Self; 3] = [Self::Json, Self::JsonLines, Self::Csv];
+    pub const ALL: [Self; 4] = [Self::Json, Self::JsonLines, Self::Csv, Self::Npy];
 
     /// What is told of it.
     #[must_use]
@@ -62,10 +67,15 @@ impl Format {
                 extensions: &["csv"],
                 help: "`u1,v1,u2,v2[,score]`, one match a row",
             },
+            Self::Npy => FormatInfo {
+                name: "npy",
+                extensions: &["npy", "npz"],
+                help: "An array of NumPy's, one match a row, or an archive of arrays",
+            },
         }
     }
 
-    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`.
+    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`, `.npy` or `.npz`.
     #[must_use]
     pub fn from_extension(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -102,6 +112,16 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Pairs, ReadError> {
     read_within(path, format, MOST_BYTES)
 }
 
+/// The pair of two files of points, one of each image, whose rows correspond: CSV or arrays of NumPy's. The place is that of the first.
+///
+/// # Errors
+/// As [`read`], for files without points, and for different numbers of them.
+pub fn read_points(files: [&Path; 2], format: Option<Format>, most: u64) -> Result<Pair, ReadError> {
+    let mut opened = [read_within(files[0], format, most)?, read_within(files[1], format, most)?];
+    let [first, second] = [opened[0].rows(&POINTS)?, opened[1].rows(&POINTS)?];
+    Ok(first.beside(second, &opened[1].place)?.pair(&opened[0].place))
+}
+
 /// As [`read`], for pairs of at most so many bytes. One of more is an error after which there are no more pairs: what follows may
 /// never end.
 ///
@@ -124,6 +144,16 @@ pub fn read_within(path: &Path, format: Option<Format>, most: u64) -> Result<Pai
     Ok(Pairs { place, format, input, most, line: 0, found_any: false, done: false })
 }
 
+/// All bytes of a file.
+pub(crate) fn whole_file(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let read = || {
+        let mut bytes = Vec::new();
+        bounded::all(&mut *open(path)?, MOST_BYTES, &mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(|fault: Fault| Place::file(path.display().to_string()).error(fault))
+}
+
 fn open(path: &Path) -> Result<Box<dyn BufRead>, Fault> {
     if path == Path::new("-") {
         return Ok(Box::new(io::stdin().lock()));
@@ -141,6 +171,7 @@ fn sniff(input: &mut dyn BufRead, most: u64) -> Result<(Format, Vec<u8>), Fault>
     let is_json = matches!(text.get(first.start), Some(b'{' | b'['));
     let is_whole = serde_json::from_slice::<serde::de::IgnoredAny>(&text[first]).is_ok();
     let format = match (is_json, is_whole) {
+        (false, _) if npy_file::is_one(&text) => Format::Npy,
         (false, _) => Format::Csv,
         (true, true) if !next_line(input, most, &mut text)?.is_empty() => Format::JsonLines,
         (true, _) => Format::Json,
@@ -174,16 +205,29 @@ impl Pairs {
         self.format
     }
 
-    fn whole(&mut self) -> Result<Pair, ReadError> {
+    fn bytes(&mut self) -> Result<Vec<u8>, ReadError> {
         let mut bytes = Vec::new();
         bounded::all(&mut *self.input, self.most, &mut bytes).map_err(|e| self.place.clone().error(e))?;
-        let text = utf8(&self.place, &bytes)?;
-        if text.trim().is_empty() {
-            return Err(self.place.clone().error(Fault::Empty));
-        }
+        Ok(bytes)
+    }
+
+    fn whole(&mut self) -> Result<Pair, ReadError> {
         match self.format {
-            Format::Csv => csv_file::parse(&self.place, text),
-            Format::Json | Format::JsonLines => json_file::parse(&self.place, text),
+            Format::Json | Format::JsonLines => {
+                let bytes = self.bytes()?;
+                json_file::parse(&self.place, text(&self.place, &bytes)?)
+            }
+            Format::Csv | Format::Npy => Ok(self.rows(&MATCHES)?.pair(&self.place)),
+        }
+    }
+
+    /// The rows of a file that holds one table.
+    fn rows<const N: usize>(&mut self, columns: &Columns<N>) -> Result<Rows<N>, ReadError> {
+        let bytes = self.bytes()?;
+        match self.format {
+            Format::Json | Format::JsonLines => Err(self.place.clone().error(Fault::NoPoints("JSON"))),
+            Format::Csv => csv_file::parse(&self.place, text(&self.place, &bytes)?, columns),
+            Format::Npy => npy_file::parse(&self.place, &bytes, columns, self.most),
         }
     }
 
@@ -211,7 +255,13 @@ impl Pairs {
     }
 }
 
-fn utf8<'a>(place: &Place, bytes: &'a [u8]) -> Result<&'a str, ReadError> {
+/// A text that says something.
+fn text<'a>(place: &Place, bytes: &'a [u8]) -> Result<&'a str, ReadError> {
+    let text = utf8(place, bytes)?;
+    if text.trim().is_empty() { Err(place.clone().error(Fault::Empty)) } else { Ok(text) }
+}
+
+pub(crate) fn utf8<'a>(place: &Place, bytes: &'a [u8]) -> Result<&'a str, ReadError> {
     let bytes = without_mark(bytes);
     std::str::from_utf8(bytes).map_err(|e| {
         let (before, rest) = bytes.split_at(e.valid_up_to());
@@ -229,7 +279,7 @@ impl Iterator for Pairs {
         }
         let pair = match self.format {
             Format::JsonLines => self.one_line(),
-            Format::Json | Format::Csv => Some(self.whole()),
+            Format::Json | Format::Csv | Format::Npy => Some(self.whole()),
         };
         self.found_any = true;
         let is_line = |error: &ReadError| error.place.line.is_some();

@@ -1,13 +1,10 @@
 //! A run as `quest_pose.servo.Recorder` writes it: an archive of NumPy's with one row an image in every column.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read;
 use std::path::Path;
 
-use flate2::bufread::DeflateDecoder;
 use npyz::{DType, Deserialize, NpyFile, Order};
-use rawzip::{CompressionMethod, ZipArchive};
 use serde::Deserialize as FromJson;
 
 use crate::Failure;
@@ -85,33 +82,13 @@ pub(super) fn read(path: &Path) -> Result<Recorded, Failure> {
 type Array<T> = (Vec<u64>, Vec<T>);
 
 /// The arrays of an archive by name.
-struct Columns(HashMap<String, Vec<u8>>);
+struct Columns(BTreeMap<String, Vec<u8>>);
 
 impl Columns {
     fn read(bytes: &[u8]) -> Result<Self, String> {
-        Self::unpacked(bytes)
-            .map_err(|e| format!("{e}, expected an archive that quest_pose.servo.Recorder wrote"))
-    }
-
-    fn unpacked(bytes: &[u8]) -> Result<Self, rawzip::Error> {
-        let archive = ZipArchive::from_slice(bytes)?;
-        let mut entries = archive.entries();
-        let mut columns = HashMap::new();
-        while let Some(entry) = entries.next_entry()? {
-            let name =
-                String::from_utf8_lossy(entry.file_path().as_bytes()).trim_end_matches(".npy").to_owned();
-            let local = archive.get_entry(entry.wayfinder())?;
-            // A small file may pretend to be a huge one: no more than LARGEST is unpacked.
-            let mut array = Vec::new();
-            if entry.compression_method() == CompressionMethod::DEFLATE {
-                let inflated = DeflateDecoder::new(local.data());
-                local.verifying_reader(inflated).take(LARGEST).read_to_end(&mut array)?;
-            } else {
-                local.verifying_reader(local.data()).take(LARGEST).read_to_end(&mut array)?;
-            }
-            columns.insert(name, array);
-        }
-        Ok(Self(columns))
+        let arrays = quest_io::unpack_npz(bytes, LARGEST)
+            .map_err(|e| format!("{e}, expected an archive that quest_pose.servo.Recorder wrote"))?;
+        Ok(Self(arrays))
     }
 
     /// A column and its shape; none where the run has no such column.

@@ -1,6 +1,15 @@
 //! Cameras as they are written in files and on the command line.
 
+mod calibration;
+mod colmap_file;
+mod file;
+mod keys;
+mod xml_file;
+mod yaml_file;
+
 use quest_core::{Camera, CameraError, CameraModel};
+
+pub use file::read_camera;
 
 /// The camera of COLMAP's model `name` with the parameters in COLMAP's order.
 ///

@@ -1,0 +1,94 @@
+//! Several files, folders and patterns: each file costs itself alone.
+
+use super::*;
+
+/// A folder with three good files, a bad one, and one of another kind.
+fn folder() -> TempDir {
+    let folder = directory_with("b.json", format!("{{\"matches\": {}}}", five_matches()));
+    fs::copy(example("points.csv"), folder.path().join("a.csv")).unwrap();
+    fs::copy(example("points.json"), folder.path().join("d.json")).unwrap();
+    fs::write(folder.path().join("c.json"), "{").unwrap();
+    fs::write(folder.path().join("words.md"), "none").unwrap();
+    folder
+}
+
+fn names(run: &Run) -> Vec<String> {
+    let name = |line: &str| serde_json::from_str::<serde_json::Value>(line).unwrap()["name"].to_string();
+    run.stdout.lines().map(|line| name(line).trim_matches('"').to_owned()).collect()
+}
+
+#[test]
+fn a_bad_file_costs_itself_alone() {
+    let folder = folder();
+    for command in
+        [&["solve", "--quiet"][..], &["estimate", "--quiet", "--threshold", "1e-6", "--threads", "2"]]
+    {
+        let run = run_in(folder.path(), &[command, &["d.json", "c.json", "no.csv", "a.csv"]].concat(), b"");
+        assert_eq!(run.status, 1, "{}", run.stderr);
+        // The file's own name for the pair is kept.
+        assert_eq!(names(&run), ["points", "c.json", "no.csv", "a.csv"]);
+        let reasons: Vec<_> = run.stderr.lines().collect();
+        assert_eq!(reasons.len(), 2, "{reasons:?}");
+        assert!(
+            reasons[0].starts_with("no pose: c.json:1:1: ") && reasons[1].starts_with("no pose: no.csv: ")
+        );
+        // Each has the answer that it has alone.
+        let alone = run_in(folder.path(), &[command, &["a.csv", "--format", "jsonl"]].concat(), b"");
+        let pose = |line: &str| {
+            let record: serde_json::Value = serde_json::from_str(line).unwrap();
+            [record["q_21"].clone(), record["candidates"][0]["q_21"].clone()]
+        };
+        let (found, expected) = (run.stdout.lines().last().unwrap(), alone.stdout.lines().next().unwrap());
+        if command[0] == "solve" {
+            assert_eq!(pose(found), pose(expected));
+        }
+        let none = run_in(folder.path(), &[command, &["c.json", "no.csv"]].concat(), b"");
+        assert_eq!(none.status, 2, "{}", none.stderr);
+    }
+}
+
+#[test]
+fn folders_and_patterns_are_read_by_name() {
+    let folder = folder();
+    let path = folder.path().to_str().unwrap().to_owned();
+    let in_folder = |name: &str| Path::new(&path).join(name).to_str().unwrap().to_owned();
+    let run = run(&["solve", "--quiet", &path]);
+    assert_eq!(
+        names(&run),
+        [in_folder("a.csv"), in_folder("b.json"), in_folder("c.json"), "points".to_owned()]
+    );
+    let run = run_in(folder.path(), &["solve", "--quiet", "[ab].*"], b"");
+    assert_eq!(
+        (run.status, names(&run)),
+        (0, vec!["a.csv".to_owned(), "b.json".to_owned()]),
+        "{}",
+        run.stderr
+    );
+    // The result of an earlier run is no input.
+    for _ in 0..2 {
+        let run = run_in(folder.path(), &["solve", "--quiet", ".", "-o", "results.jsonl"], b"");
+        assert_eq!(run.status, 1, "{}", run.stderr);
+        let text = fs::read_to_string(folder.path().join("results.jsonl")).unwrap();
+        assert_eq!(text.lines().count(), 4);
+    }
+}
+
+#[test]
+fn what_stands_for_no_file_is_an_error() {
+    let empty = directory_with("words.md", "");
+    let run = |argument: &str| run_in(empty.path(), &["estimate", argument], b"");
+    let (folder, pattern) = (run("."), run("*.npz"));
+    assert_eq!((folder.status, pattern.status), (2, 2));
+    let extensions = "expected one of .json, .jsonl, .ndjson, .csv, .npy, .npz\n";
+    assert_eq!(folder.stderr, format!("error: .: found a folder without files of matches, {extensions}"));
+    assert_eq!(pattern.stderr, "error: *.npz: found no file of this pattern, expected at least one\n");
+}
+
+#[test]
+fn a_pair_without_a_scale_costs_itself_alone() {
+    let folder = folder();
+    let files = [example("tumfr3_98072_98172.json"), "a.csv".to_owned()];
+    let run = run_in(folder.path(), &["estimate", &files[0], &files[1]], b"");
+    assert_eq!((run.status, run.stdout.lines().count()), (1, 2), "{}", run.stderr);
+    assert!(run.stderr.starts_with("no pose: a.csv: found no camera and no --threshold"), "{}", run.stderr);
+}
