@@ -38,6 +38,8 @@ myst_heading_anchors = 4
 # The docstrings are in NumPy's form.
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+# `x1, x2 : array_like` stays one entry, with one text.
+napoleon_use_param = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
@@ -48,9 +50,12 @@ html_theme = "furo"
 html_title = "quest-pose"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["scroll.js"]
+templates_path = ["templates"]
 html_copy_source = False
 html_show_sphinx = False
-html_theme_options = {"source_repository": repository, "source_branch": "main", "source_directory": "docs/site/"}
+# Many pages include files of the repository, so a link to a page's own source would lead to next to nothing.
+html_theme_options = {"top_of_page_buttons": []}
 # Sphinx has lexers for `console` and `text`; Pygments has none for JSON Lines and the like, which are `text` here.
 highlight_language = "text"
 
@@ -126,6 +131,21 @@ def plain_docstring(app, what, name, obj, options, lines):
         del lines[:]
 
 
+def heading_levels(app, pagename, templatename, context, doctree):
+    """The captions of the sidebar are headings; a screen reader has to know of which level."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
+def mend_pages(app, exception):
+    """What a screen reader needs and the writers leave out: names of the two sidebars, no headers without a word."""
+    for page in Path(app.outdir).rglob("*.html"):
+        text = page.read_text()
+        for part, name in (("sidebar-drawer", "Site"), ("toc-drawer", "This page")):
+            text = text.replace(f'<aside class="{part}', f'<aside aria-label="{name}" class="{part}')
+        page.write_text(text.replace('<th class="head"><p></p></th>', "<td></td>"))
+
+
 def formula(display):
     """What writes a formula into a page."""
 
@@ -139,4 +159,7 @@ def formula(display):
 def setup(app):
     app.add_html_math_renderer("mathml", formula(display=False), formula(display=True))
     app.connect("source-read", include_files)
+    # After the theme has put the sidebar together.
+    app.connect("html-page-context", heading_levels, priority=900)
+    app.connect("build-finished", mend_pages)
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)
