@@ -81,6 +81,8 @@ struct Planted {
     truth: RelativePose,
     matches: Vec<Correspondence>,
     true_count: usize,
+    /// The depths of the true matches' points, summed over both views.
+    depths: f64,
 }
 
 fn correspondence(a: [f64; 2], b: [f64; 2]) -> Correspondence {
@@ -98,7 +100,7 @@ impl Planted {
         let direction = Vector3::from_fn(|_, _| normal()).normalize();
         let turn = Vector3::from_fn(|_, _| normal()) * 0.02;
         let truth = RelativePose::new(UnitQuaternion::new(turn), direction * step);
-        Self { rng, truth, matches: Vec::new(), true_count: 0 }
+        Self { rng, truth, matches: Vec::new(), true_count: 0, depths: 0.0 }
     }
 
     fn normal(&mut self) -> f64 {
@@ -122,6 +124,7 @@ impl Planted {
                 let [a, b] = [a, b].map(|p| p.map(|x| x + NOISE * self.normal()));
                 self.matches.push(correspondence(a, b));
                 self.true_count += 1;
+                self.depths += x1.z + x2.z;
             }
         }
     }
@@ -161,8 +164,9 @@ impl Planted {
             let block: Matrix3<f64> = found.covariance.fixed_view::<3, 3>(at, at).into_owned();
             block.cholesky().map_or(f64::INFINITY, |factor| error.dot(&factor.solve(&error)))
         };
-        // Points 4 to 9 away have a mean depth of 6.5.
-        [of(0, turn), of(3, self.truth.t_21 / 6.5 - found.pose.t_21)]
+        // A length is in units of the mean depth over both views.
+        let unit = self.depths / (2 * self.true_count) as f64;
+        [of(0, turn), of(3, self.truth.t_21 / unit - found.pose.t_21)]
     }
 }
 

@@ -12,12 +12,14 @@
 //! `A` is the area over which the points of view 2, false ones too, are spread. `h` is the leverage `Jᵀ H⁻¹ J` of the match:
 //! a pose fitted without it has the residual `r / (1 − h)`, with the variance `σ² / (1 − h)`; `c` is the scale of the loss. `ρ` is
 //! the inverse depth, `w` its precision at unit noise; `2 √w dr dρ` is an element of the area. All that is known of the
-//! inverse depths is where most of them are, `m ± γ`, and that few points are near ([`Usual`]).
+//! inverse depths is where most of them are, `m ± γ`, and that few points are near ([`Usual`]). Whether any are is counted: where chance
+//! explains all inliers of unusual depths, as false matches show, no point is near, however long the tail of `p(ρ)` is.
 
 use std::f64::consts::PI;
 
 use crate::robust::conclude::final_refinement::{FEWEST, Polished, best_of};
 use crate::robust::conclude::inverse_depth::{InverseDepth, Usual};
+use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
 use crate::robust::refine::epipolar::{FINE, One, Subset, refine};
 use crate::robust::search::pose_score::PoseScorer;
@@ -33,20 +35,56 @@ const STEPS: usize = 10;
 /// Depths within this multiple of `γ` are usual.
 const USUAL: f64 = 3.0;
 
+/// The share of `p(ρ)` that is farther away than that: `2 ∫ 3√3 / (4π (1 + u³)) du`.
+const UNUSUAL: f64 = 0.0452;
+
+/// False matches are counted within so many times the threshold, where there are more of them to count.
+const WIDE: f64 = 3.0;
+
 /// Among more inliers than this one false match has no weight.
 const ENOUGH: usize = 20_000;
 
+/// What is known of the matches that agree with a pose by chance.
+#[derive(Clone, Debug)]
+pub(crate) struct ByChance {
+    /// Those that are recognised: they are within the threshold, and no inliers.
+    pub(crate) matches: Vec<u32>,
+    /// Where depths are usual, if that was asked.
+    usual: Option<Usual>,
+    /// How many points of unusual depths there are, as a share of what `p(ρ)` says.
+    believed: f64,
+}
+
+impl ByChance {
+    /// Nothing is known.
+    pub(crate) fn unknown() -> Self {
+        Self { matches: Vec::new(), usual: None, believed: 1.0 }
+    }
+
+    /// How likely a false match of this depth stays among the inliers, with noise of so many pixels.
+    pub(crate) fn stays(&self, depth: &InverseDepth, sigma: f64) -> f64 {
+        let is_unusual = self.usual.is_some_and(|usual| usual.distance(depth, sigma) > USUAL);
+        if is_unusual { self.believed } else { 1.0 }
+    }
+}
+
 /// Refines a pose without the inliers that agree with it by chance.
-pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: Polished) -> Polished {
+pub(crate) fn refine_without_chance(
+    poses: &mut PoseScorer,
+    polished: Polished,
+    false_matches: &Columns,
+) -> Polished {
     let observations = poses.observations;
     let mut motion = *polished.motion();
     // Where there are few matches none can be spared.
     if !(MANY..=ENOUGH).contains(&polished.pose.inliers.len()) {
         return polished;
     }
-    let mut chance = doubtful(observations, &polished.pose.inliers, &motion, &polished);
+    let (usual, believed) = unusual_depths(observations, &polished, false_matches);
+    let mut by_chance = ByChance { matches: Vec::new(), usual: Some(usual), believed };
+    let mut chance = doubtful(observations, &polished.pose.inliers, &motion, &polished, believed);
     if chance.is_empty() {
-        return polished;
+        return Polished { by_chance, ..polished };
     }
     let mut kept = poses.score(motion, polished.limit).inliers;
     for _ in 0..ROUNDS {
@@ -54,16 +92,42 @@ pub(crate) fn refine_without_chance(poses: &mut PoseScorer, polished: Polished) 
             break;
         }
         kept.retain(|i| !chance.contains(i));
+        by_chance.matches.append(&mut chance);
         refine(&Subset::new(&observations.columns, &kept), &mut motion, &polished.loss, FINE, STEPS);
-        chance = doubtful(observations, &kept, &motion, &polished);
+        chance = doubtful(observations, &kept, &motion, &polished, believed);
     }
     let motion = best_of(poses, &motion).map_or(*polished.motion(), |best| best.motion);
     let pose = poses.score(motion, poses.threshold());
-    polished.with_pose(pose, poses.threshold())
+    // Others agree with the refined pose.
+    by_chance.matches.append(&mut doubtful(observations, &pose.inliers, &motion, &polished, believed));
+    Polished { by_chance, ..polished.with_pose(pose, poses.threshold()) }
+}
+
+/// Where depths are usual, and how many points of unusual depths there are, as a share of what `p(ρ)` says: those that chance does
+/// not explain.
+fn unusual_depths(observations: &Observations, polished: &Polished, false_matches: &Columns) -> (Usual, f64) {
+    let (motion, sigma) = (polished.motion(), polished.sigma);
+    let inliers = &polished.pose.inliers;
+    let depths = InverseDepth::all(&observations.columns, motion, inliers);
+    let usual = Usual::new(&depths);
+    let count = |depths: &[InverseDepth]| {
+        depths.iter().filter(|depth| usual.distance(depth, sigma) > USUAL).count() as f64
+    };
+    let agreeing = false_matches.agreeing(motion, WIDE * false_matches.threshold());
+    let each = (observations.len() - inliers.len()) as f64 / (WIDE * false_matches.len().max(1) as f64);
+    let by_chance = count(&InverseDepth::all(false_matches, motion, &agreeing)) * each;
+    let more = count(&depths) - by_chance;
+    (usual, (more / (UNUSUAL * inliers.len() as f64)).clamp(0.0, 1.0))
 }
 
 /// The inliers that are more likely false than true.
-fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polished: &Polished) -> Vec<u32> {
+fn doubtful(
+    observations: &Observations,
+    inliers: &[u32],
+    motion: &Motion,
+    polished: &Polished,
+    believed: f64,
+) -> Vec<u32> {
     let depths = InverseDepth::all(&observations.columns, motion, inliers);
     let (sigma, loss) = (polished.sigma, polished.loss);
     let usual = Usual::new(&depths);
@@ -84,7 +148,7 @@ fn doubtful(observations: &Observations, inliers: &[u32], motion: &Motion, polis
         let misfit = 1.0 + own.square / (free * loss.square_scale());
         let across = free.sqrt() / ((2.0 * PI).sqrt() * sigma * misfit * misfit);
         let along = usual.density(depth, sigma) / (2.0 * depth.precision.sqrt());
-        prior * area * across * along < 1.0
+        believed * prior * area * across * along < 1.0
     };
     candidates.filter(is_doubtful).map(|(&index, _)| index).collect()
 }
@@ -94,6 +158,7 @@ mod tests {
     use super::*;
     use crate::Correspondence;
     use crate::lanes::SearchScore;
+    use crate::robust::conclude::false_alarms;
     use crate::robust::conclude::final_refinement::polish;
     use crate::simulate::{self, FOCAL_LENGTH, Scene, SceneOptions};
     use nalgebra::Vector3;
@@ -124,7 +189,8 @@ mod tests {
         let mut poses = PoseScorer::new(&observations, SearchScore::default());
         let polished = polish(&mut poses, start);
         let before = *polished.motion();
-        let after = *refine_without_chance(&mut poses, polished).motion();
+        let false_matches = false_alarms::false_matches(&observations);
+        let after = *refine_without_chance(&mut poses, polished, &false_matches).motion();
         let inliers = poses.score(after, 1.5).inliers;
         let more = inliers.into_iter().filter(|&i| i as usize >= scene.points1.len());
         (more.collect(), [before, after])

@@ -13,7 +13,8 @@
 //! `S` is what false matches that happen to agree with the pose pull at it. As many as there are outliers are expected to have
 //! `S = Σ ψ² J Jᵀ / (1 + h)`, which is measured on false matches (see [`false_alarms`](crate::robust::conclude::false_alarms)). A match with the
 //! leverage `h = ψ/r Jᵀ H⁻¹ J` turns the pose `1 + h` times less than one without, but agrees up to `√(1 + h)` times as far away
-//! as soon as it is fitted: `√(1 + h)` if all of those stay, `(1 + h)²` if none do; some are [left out](crate::robust::conclude::chance_inliers).
+//! as soon as it is fitted: `√(1 + h)` if all of those stay, `(1 + h)²` if none do; those of unusual depths are
+//! [left out](crate::robust::conclude::chance_inliers) as far as chance explains them.
 //!
 //! The five parameters of a motion become the six of a pose by the length of the translation and its derivatives.
 
@@ -105,12 +106,13 @@ fn probable_points(observations: &Observations, inliers: &[u32], polished: &Poli
 
 /// The mean of `ψ² H⁻¹ J Jᵀ H⁻¹ / (1 + h)` over false matches, most of which are too far off to count; `inverse` is `H⁻¹`.
 fn pull_of_a_match(false_matches: &Columns, polished: &Polished, inverse: &Matrix5<f64>) -> Matrix5<f64> {
-    let (motion, Polished { loss, limit, .. }) = (polished.motion(), polished);
+    let (motion, Polished { loss, limit, sigma, by_chance, .. }) = (polished.motion(), polished);
     let mut sum = Matrix5::zeros();
     for index in false_matches.agreeing(motion, *limit) {
         let own = One::new(false_matches, index, motion, loss, inverse);
+        let stays = by_chance.stays(&InverseDepth::new(false_matches, motion, index as usize), *sigma);
         let turn = inverse * own.gradient * own.weight;
-        sum += turn * turn.transpose() / (1.0 + own.leverage);
+        sum += turn * turn.transpose() * (stays / (1.0 + own.leverage));
     }
     sum / false_matches.len().max(1) as f64
 }
@@ -184,6 +186,7 @@ mod tests {
     use super::*;
     use crate::Correspondence;
     use crate::lanes::SearchScore as Score;
+    use crate::robust::conclude::chance_inliers::ByChance;
     use crate::robust::conclude::false_alarms;
     use crate::robust::refine::loss::HeavyTailed;
     use crate::robust::search::pose_score::PoseScorer;
@@ -198,7 +201,13 @@ mod tests {
         let mut poses = PoseScorer::new(&observations, Score::default());
         let pose = poses.score(motion, 1.5);
         assert_eq!(pose.inliers.len(), 100);
-        let polished = Polished { pose, sigma: 0.5, loss: HeavyTailed::new(2.5), limit: 4.5 };
+        let polished = Polished {
+            pose,
+            sigma: 0.5,
+            loss: HeavyTailed::new(2.5),
+            limit: 4.5,
+            by_chance: ByChance::unknown(),
+        };
         let false_matches = false_alarms::false_matches(&observations);
         let five = of_motion(&observations, &polished, &false_matches).unwrap();
         let subset = Subset::new(&observations.columns, &polished.pose.inliers);

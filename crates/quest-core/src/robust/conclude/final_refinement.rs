@@ -1,5 +1,6 @@
 //! The last refinement of a pose: over all of its inliers, with the noise that they show.
 
+use crate::robust::conclude::chance_inliers::ByChance;
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::refine::loss::{HeavyTailed, Truncated};
 use crate::robust::refine::noise;
@@ -33,6 +34,8 @@ pub(crate) struct Polished {
     /// The loss of the last refinement, and how far away, in pixels, a match still had a say.
     pub(crate) loss: HeavyTailed,
     pub(crate) limit: f64,
+    /// The matches that agree with it by chance.
+    pub(crate) by_chance: ByChance,
 }
 
 impl Polished {
@@ -77,7 +80,7 @@ pub(crate) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     }
     poses.recycle(wide);
     let sigma = noise::estimate(pose.inlier_residuals(), threshold);
-    Polished { pose, sigma, loss, limit }
+    Polished { pose, sigma, loss, limit, by_chance: ByChance::unknown() }
 }
 
 /// The best of the four poses with the essential matrix of a motion.

@@ -1,14 +1,16 @@
 //! The length of the translation in the scale of [`conventions`](crate::conventions): the mean absolute depth is one.
 //!
-//! Where every depth stands clear of its noise, that mean is computed. Where some depths do not, the median of the inverse depths is
-//! taken, signs included: their noise is symmetric, and the median goes to zero with the parallax. Weighted means would be ruled by a
-//! few chance inliers.
+//! Where most depths stand clear of their noise, the mean is computed, over the points that are seen well enough at a usual depth. Among
+//! those near an epipole, which are not, only near points would stand clear, and the mean would be too small. Where some depths do not
+//! stand clear, the median of the inverse depths is taken, signs included: their noise is symmetric, and the median goes to zero with the
+//! parallax. Weighted means would be ruled by a few chance inliers.
 //!
 //! The noise of depths, given the motion, averages out soon. The rest of the variance comes from which points the mean is over: true
 //! matches beyond the threshold are missing, and false matches with any depth are among the inliers.
 
 use nalgebra::{Vector3, Vector5};
 
+use crate::robust::conclude::chance_inliers::ByChance;
 use crate::robust::conclude::inverse_depth::{Differentiated, InverseDepth};
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
@@ -16,6 +18,10 @@ use crate::solver::shared::motion::Motion;
 
 /// A depth stands clear of its noise at this many standard deviations.
 const CLEAR: f64 = 3.0;
+
+/// A point is seen well if its depth, were it a usual one, would stand clear by so many times more: points that are twice as far away
+/// are then clear as well.
+const WELL: f64 = 2.0;
 
 /// More points are in front of the cameras than behind by so many standard deviations of a vote by chance.
 const BY_CHANCE: f64 = 2.0;
@@ -65,10 +71,13 @@ impl BothDepths {
         Self { rho: [one * scales[0], two * scales[1]], variance: depth.variance(sigma) }
     }
 
+    fn sum(&self) -> f64 {
+        self.rho[0].value + self.rho[1].value
+    }
+
     /// Its variance over its square.
     fn relative(&self) -> f64 {
-        let sum = self.rho[0].value + self.rho[1].value;
-        4.0 * self.variance / (sum * sum)
+        4.0 * self.variance / self.sum().powi(2)
     }
 
     /// The mean of the two depths.
@@ -93,6 +102,7 @@ pub(crate) struct Noise<'a> {
     /// In pixels.
     pub(crate) sigma: f64,
     pub(crate) false_matches: &'a Columns,
+    pub(crate) by_chance: &'a ByChance,
 }
 
 /// The length of the translation of a motion, negative where most of the points are behind the cameras.
@@ -112,17 +122,34 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
     if (clear.len() as f64) < MOST * all.len() as f64 {
         return by_inverse_depths(&all);
     }
-    let Noise { sigma, false_matches } = *noise;
+    let Noise { sigma, false_matches, by_chance } = *noise;
     let threshold = false_matches.threshold();
-    let of_false = |index: u32| BothDepths::new(false_matches, index as usize, None, motion, sigma);
+    let of_false = |index: u32| {
+        let stays = by_chance.stays(&InverseDepth::new(false_matches, motion, index as usize), sigma);
+        (BothDepths::new(false_matches, index as usize, None, motion, sigma), stays)
+    };
     let agreeing = false_matches.agreeing(motion, threshold).into_iter().map(of_false);
     let outliers = (observations.len() - inliers.len()) as f64 * some.len() as f64 / inliers.len() as f64;
     let chance = Chance {
-        depths: agreeing.filter(BothDepths::is_clear).map(|depth| depth.z()).collect(),
+        depths: agreeing
+            .filter(|(depth, _)| depth.is_clear())
+            .map(|(depth, stays)| (depth.z(), stays))
+            .collect(),
         each: outliers / false_matches.len().max(1) as f64,
         missed: beyond(threshold / sigma),
     };
-    by_depths(&clear, &chance)
+    let well = seen_well(&clear);
+    let unseen = (all.len() - well.len()) as f64 / well.len() as f64;
+    by_depths(&well, &Chance { missed: chance.missed + unseen, ..chance })
+}
+
+/// Those of which a usual depth would stand clear with room to spare; all of them where there are few of these.
+fn seen_well(clear: &[BothDepths]) -> Vec<BothDepths> {
+    let mut sums: Vec<f64> = clear.iter().map(BothDepths::sum).collect();
+    let usual = median(&mut sums);
+    let limit = (0.5 * usual / (WELL * CLEAR)).powi(2);
+    let well: Vec<_> = clear.iter().copied().filter(|depth| depth.variance < limit).collect();
+    if 2 * well.len() < clear.len() { clear.to_vec() } else { well }
 }
 
 /// The share of a normal variable beyond this many standard deviations, by the bound of Mills' ratio.
@@ -133,8 +160,8 @@ fn beyond(deviations: f64) -> f64 {
 
 /// The inliers that are false, and the true matches that are not among them.
 struct Chance {
-    /// The depths of some that are false.
-    depths: Vec<f64>,
+    /// The depths of some that are false, and how likely each stays among the inliers.
+    depths: Vec<(f64, f64)>,
     /// As how many inliers each of them counts.
     each: f64,
     /// The share of true matches that are no inliers.
@@ -159,7 +186,7 @@ fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
     let of_noise: f64 =
         all.iter().map(|depth| depth.variance * depth.z().powi(4)).sum::<f64>() * value * value;
     let of_missed = chance.missed * all.iter().map(|depth| square(&depth.z())).sum::<f64>();
-    let of_false = chance.each * chance.depths.iter().map(square).sum::<f64>();
+    let of_false = chance.each * chance.depths.iter().map(|(z, stays)| stays * square(z)).sum::<f64>();
     // d(n/Σz) = (n/Σz)² Σ z² dρ / n.
     let by_mean = value * value / count;
     Length {

@@ -54,8 +54,8 @@ pub(crate) fn conclude(
     let plane = plane::fit(observations, &polished, rng);
     let others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     let polished = better_of(poses, polished, &others);
-    let polished = refine_without_chance(poses, polished);
     let false_matches = false_alarms::false_matches(observations);
+    let polished = refine_without_chance(poses, polished, &false_matches);
     let false_share = Chance::new(&false_matches, polished.motion()).share(poses.threshold());
     let log_alarms = log_false_alarms(poses, &polished, found.tries, blind, &false_matches);
     let inliers = polished.pose.inliers.len();

@@ -8,6 +8,7 @@ use crate::robust::MIN_MATCHES;
 use crate::robust::conclude::alternatives::{
     Alternative, as_likely, both_of_plane, distance, is_same, second_of_few,
 };
+use crate::robust::conclude::chance_inliers::ByChance;
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
@@ -63,6 +64,12 @@ pub(crate) fn report(
     let Conclusion { mut polished, small, plane, verdict, false_matches, false_share, .. } = conclusion;
     let (model, sigma) = (verdict.model, polished.sigma);
     polished.pose = poses.score(motion, poses.threshold());
+    // Of a small motion the likelihood says which they are.
+    if small.is_some() || !matches!(answer, Answer::Best) {
+        polished.by_chance = ByChance::unknown();
+    }
+    let by_chance = polished.by_chance.clone();
+    polished.pose.inliers.retain(|i| !by_chance.matches.contains(i));
     // The motions of an exact plane have a covariance of their own.
     let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
     let small = small.filter(|_| !is_of_plane && matches!(answer, Answer::Best)).map(|small| match model {
@@ -82,7 +89,7 @@ pub(crate) fn report(
     if inliers.len() < MIN_MATCHES {
         return None;
     }
-    let noise = Noise { sigma, false_matches };
+    let noise = Noise { sigma, false_matches, by_chance: &by_chance };
     let size = length(observations, &motion, inliers, &noise);
     let pose = with_length(&motion, size);
     let (pose, covariance) = if let Some(small) = &small {
