@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import re
+import subprocess
 import sys
 from importlib.metadata import requires, version
 from pathlib import Path
@@ -18,6 +19,14 @@ def test_version() -> None:
 def test_numpy_is_all_it_needs() -> None:
     needed = [r for r in requires("quest-pose") or [] if "extra ==" not in r]
     assert [r.split(">")[0] for r in needed] == ["numpy"]
+
+
+@pytest.mark.parametrize("name", ["arrow", "colmap", "compat", "dask", "paper", "servo"])
+def test_modules_need_no_import_of_their_own(name: str) -> None:
+    names = f"import quest_pose; assert quest_pose.{name}.__name__ == 'quest_pose.{name}'"
+    subprocess.run([sys.executable, "-c", names], check=True)
+    with pytest.raises(AttributeError, match="no attribute 'colmpa'"):
+        getattr(qp, "colmpa")  # noqa: B009  a type checker would find the attribute missing
 
 
 def test_examples() -> None:

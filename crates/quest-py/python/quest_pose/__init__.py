@@ -23,6 +23,7 @@ answer a ``NoAnswer``; what is no array of numbers at all is a ``TypeError``.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
@@ -92,6 +93,14 @@ __all__ = [
     "solvers",
     "third_view",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """A module of the package, which is loaded when it is named first: ``quest_pose.colmap`` needs no import of its own."""
+        if name in {"arrow", "colmap", "compat", "dask", "paper", "servo"}:
+            return importlib.import_module(f"quest_pose.{name}")
+        raise AttributeError(f"module 'quest_pose' has no attribute {name!r}")
 
 
 class SolverInfo(NamedTuple):
