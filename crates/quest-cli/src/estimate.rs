@@ -17,7 +17,7 @@ use crate::{
     in_order::in_order,
     input::{InputsOptions, Unread},
     options::OutputOptions,
-    progress::Progress,
+    progress::ProgressOptions,
     rows,
     tally::{Refusal, Tally},
     words,
@@ -92,6 +92,8 @@ pub(crate) struct Arguments {
     #[arg(long, requires = "output")]
     resume: bool,
     #[command(flatten)]
+    progress: ProgressOptions,
+    #[command(flatten)]
     output: OutputOptions,
 }
 
@@ -120,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let is_several = pairs.is_several();
     arguments.check(is_several)?;
     let (mut writer, there) = Writer::open_long(&arguments.output, is_several, arguments.resume)?;
-    let progress = Progress::new("pairs", None, arguments.output.quiet);
+    let progress = arguments.progress.start("pairs", None, arguments.output.quiet);
     let mut tally = Tally::after(there);
     let numbered = (arguments.first_index..).map_while(|index| {
         let pair = pairs.next().transpose()?;

@@ -1,7 +1,7 @@
 //! Whatever a file holds, the reader answers with a pair or with one line.
 #![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
-use std::{fs, path::Path};
+use std::{fs, io::Write, path::Path};
 
 use proptest::{prelude::*, sample::Index};
 use quest_io::{Format, Pair, ReadError};
@@ -14,8 +14,9 @@ const PAIR: &str = r#"{"name": "a", "camera1": {"model": "PINHOLE", "width": 640
 fn read(bytes: &[u8]) -> Vec<Result<Pair, ReadError>> {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(file.path(), bytes).unwrap();
-    let formats = [None, Some(Format::Json), Some(Format::JsonLines), Some(Format::Csv)];
-    let results: Vec<_> = formats.iter().flat_map(|&f| read_as(file.path(), f)).collect();
+    let formats = [None].into_iter().chain(Format::ALL.map(Some));
+    let mut results: Vec<_> = formats.flat_map(|f| read_as(file.path(), f)).collect();
+    results.push(quest_io::read_points([file.path(); 2], None, quest_io::MOST_BYTES));
     for result in &results {
         match result {
             Ok(pair) => in_order(pair),
@@ -55,6 +56,32 @@ fn the_pair_that_is_changed_is_a_good_one() {
     assert_eq!(pair.focal_length(), Some(505.0));
 }
 
+/// Two rows of matches as NumPy writes them, and an archive of them without compression.
+fn arrays() -> [Vec<u8>; 2] {
+    let mut array = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 4), }";
+    array.extend(format!("{header:<117}\n").bytes());
+    array.extend((0..8).flat_map(|k| f64::from(k).to_le_bytes()));
+    let mut archive = Vec::new();
+    let mut zip = rawzip::ZipArchiveWriter::new(&mut archive);
+    let (mut entry, config) = zip.new_file("matches.npy").start().unwrap();
+    let mut writer = config.wrap(&mut entry);
+    writer.write_all(&array).unwrap();
+    let descriptor = writer.finish().unwrap().1;
+    entry.finish(descriptor).unwrap();
+    zip.finish().unwrap();
+    [array, archive]
+}
+
+#[test]
+fn the_arrays_that_are_changed_are_good_ones() {
+    for bytes in arrays() {
+        let results = read(&bytes);
+        let pair = results[0].as_ref().unwrap();
+        assert_eq!(pair.matches, [[0.0, 1.0, 2.0, 3.0], [4.0, 5.0, 6.0, 7.0]]);
+    }
+}
+
 #[test]
 fn deep_nesting_is_refused() {
     for open in ["[", "{\"matches\":"] {
@@ -80,6 +107,30 @@ proptest! {
             let index = index.index(bytes.len());
             bytes[index] = byte;
         }
+        read(&bytes);
+    }
+
+    #[test]
+    fn an_array_with_bytes_changed(which in 0..2_usize, changes in prop::collection::vec((any::<Index>(), any::<u8>()), 1..4)) {
+        let mut bytes = arrays()[which].clone();
+        for (index, byte) in changes {
+            let index = index.index(bytes.len());
+            bytes[index] = byte;
+        }
+        read(&bytes);
+    }
+
+    #[test]
+    fn an_array_of_any_shape_and_type(
+        shape in "[0-9]{0,20}(, ?[0-9]{0,20}){0,3}",
+        kind in "[<>|=][a-zA-Z?][0-9]{0,3}|\\[\\('a', '<f8'\\)\\]",
+        order in "True|False|1",
+    ) {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(u16::try_from(header.len()).unwrap().to_le_bytes());
+        bytes.extend(header.bytes());
+        bytes.extend([0; 64]);
         read(&bytes);
     }
 

@@ -22,6 +22,7 @@ use self::{pairs::Planted, record::Record, run::Run};
 use crate::{
     Failure, Outcome,
     options::{Format, OutputOptions, kinds_parser, solver_parser},
+    progress::ProgressOptions,
     rows,
 };
 
@@ -57,7 +58,8 @@ values at which a solver has smaller errors than the first solver at the same sc
 confidence interval of the mean difference is below zero.";
 
 /// Options that `--pairs`, and those that belong to it, would ignore. clap does not ask for `--pairs` beside one of them.
-const OF_EXPERIMENTS: [&str; 7] = ["figure", "table", "plot", "trials", "solvers", "kinds", "threads"];
+const OF_EXPERIMENTS: [&str; 8] =
+    ["figure", "table", "plot", "trials", "solvers", "kinds", "threads", "progress"];
 
 /// The experiments of the paper's section 9: errors of the solvers on random scenes, and their times.
 #[derive(Args, Debug)]
@@ -121,6 +123,8 @@ pub(crate) struct Arguments {
     /// Number of threads; 0 takes as many as there are cores.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
+    #[command(flatten)]
+    progress: ProgressOptions,
     #[command(flatten)]
     output: OutputOptions,
 }
@@ -242,6 +246,7 @@ impl Arguments {
             },
             base: self.base(),
             threads: self.threads,
+            progress: self.progress,
             is_quiet: self.output.quiet,
         })
     }

@@ -7,7 +7,10 @@ use quest_core::{
 use rayon::prelude::*;
 
 use super::{Record, record::Quantity, statistics::Statistics, timing};
-use crate::{Failure, progress::Progress};
+use crate::{
+    Failure,
+    progress::{Progress, ProgressOptions},
+};
 
 /// What is run.
 #[derive(Clone, Debug)]
@@ -25,6 +28,7 @@ pub(crate) struct Run {
     pub(crate) scenes: &'static str,
     pub(crate) base: SceneOptions,
     pub(crate) threads: usize,
+    pub(crate) progress: ProgressOptions,
     pub(crate) is_quiet: bool,
 }
 
@@ -84,7 +88,7 @@ impl Run {
     fn progress(&self) -> Progress {
         let cells = |&figure: &Figure| figure.cells(&self.base).len() as u64;
         let scenes = self.figures.iter().map(|f| cells(f) * u64::from(self.trials_of(*f))).sum();
-        Progress::new("scenes", Some(scenes), self.is_quiet)
+        self.progress.start("scenes", Some(scenes), self.is_quiet)
     }
 
     fn figure(&self, figure: Figure, progress: &Progress) -> Result<Vec<Record>, SceneError> {

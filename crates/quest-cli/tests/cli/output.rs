@@ -47,6 +47,23 @@ fn the_shipped_examples_print_no_warnings() {
 }
 
 #[test]
+fn progress_is_told_where_it_is_asked_for() {
+    let pair = example("hololens_00011_00015.json");
+    let told = run(&["estimate", &pair, &pair, "--progress", "always"]).stderr;
+    assert!(told.starts_with("progress: 2 pairs in ") && told.ends_with(" s\n"), "{told}");
+    let table = ["simulate", "--figure", "4", "--trials", "2", "--solvers", "quest", "--format", "csv"];
+    let told = run(&[&table[..], &["--progress", "always"]].concat()).stderr;
+    let counts = told.strip_prefix("progress: ").unwrap().split(" scenes in ").next().unwrap().to_owned();
+    let (done, total) = counts.split_once(" of ").unwrap();
+    assert!(done == total && done.parse::<u64>().unwrap() > 2, "{told}");
+    for more in [&[][..], &["--progress", "never"], &["--progress", "auto"], &["--quiet"]] {
+        assert_eq!(run(&[&["estimate", &pair], more].concat()).stderr, "", "{more:?}");
+    }
+    let both = run(&["estimate", &pair, "--progress", "always", "--quiet"]);
+    assert!(both.status == 2 && both.stderr.contains("cannot be used with"), "{}", both.stderr);
+}
+
+#[test]
 fn what_would_have_no_effect_is_an_error() {
     let (points, pair) = (example("points.json"), example("tumfr3_98072_98172.json"));
     for (arguments, words) in [
