@@ -80,7 +80,8 @@ fn the_same_seed_gives_the_same_answer() {
 fn a_turn_in_place_has_no_translation() {
     let (run, result) = estimated(&pair([0.0; 3], 60, true), &[]);
     assert_eq!((run.status, &result["model"]), (0, &json!("pure_rotation")));
-    assert!(result["parallax"].as_f64().unwrap() < 1e-6);
+    // A hundredth of a pixel, the least noise that is assumed, would make 1e-5.
+    assert!(result["parallax"].as_f64().unwrap() < 1e-5);
 }
 
 #[test]

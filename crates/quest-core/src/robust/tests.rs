@@ -173,9 +173,9 @@ fn the_unit_of_the_threshold_does_not_matter() {
             }
             // The search may come to the same optimum on another way, to its last step.
             assert_eq!(in_radians.inliers, in_pixels.inliers, "{index}");
-            // A fit of depths ends after some rounds, a fiftieth of a deviation from its limit.
+            // A fit of depths ends after some rounds, an eighth of a deviation from its limit where few matches tell of a small motion.
             let deviation =
-                |at| in_pixels.covariance.fixed_view::<3, 3>(at, at).into_owned().trace().sqrt() / 50.0;
+                |at| in_pixels.covariance.fixed_view::<3, 3>(at, at).into_owned().trace().sqrt() / 8.0;
             let turn = in_radians.pose.rotation_error(&in_pixels.pose);
             assert!(turn < deviation(0).max(1e-5), "{index} {turn}");
             let step = (in_radians.pose.t_21 - in_pixels.pose.t_21).norm();

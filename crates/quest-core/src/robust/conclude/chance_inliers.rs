@@ -17,6 +17,7 @@
 
 use std::f64::consts::PI;
 
+use crate::robust::conclude::by_chance::{ByChance, USUAL};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished, best_of};
 use crate::robust::conclude::inverse_depth::{InverseDepth, Usual};
 use crate::robust::data::columns::Columns;
@@ -32,9 +33,6 @@ const ROUNDS: usize = 3;
 /// Steps of a refinement.
 const STEPS: usize = 10;
 
-/// Depths within this multiple of `γ` are usual.
-const USUAL: f64 = 3.0;
-
 /// The share of `p(ρ)` that is farther away than that: `2 ∫ 3√3 / (4π (1 + u³)) du`.
 const UNUSUAL: f64 = 0.0452;
 
@@ -43,30 +41,6 @@ const WIDE: f64 = 3.0;
 
 /// Among more inliers than this one false match has no weight.
 const ENOUGH: usize = 20_000;
-
-/// What is known of the matches that agree with a pose by chance.
-#[derive(Clone, Debug)]
-pub(crate) struct ByChance {
-    /// Those that are recognised: they are within the threshold, and no inliers.
-    pub(crate) matches: Vec<u32>,
-    /// Where depths are usual, if that was asked.
-    usual: Option<Usual>,
-    /// How many points of unusual depths there are, as a share of what `p(ρ)` says.
-    believed: f64,
-}
-
-impl ByChance {
-    /// Nothing is known.
-    pub(crate) fn unknown() -> Self {
-        Self { matches: Vec::new(), usual: None, believed: 1.0 }
-    }
-
-    /// How likely a false match of this depth stays among the inliers, with noise of so many pixels.
-    pub(crate) fn stays(&self, depth: &InverseDepth, sigma: f64) -> f64 {
-        let is_unusual = self.usual.is_some_and(|usual| usual.distance(depth, sigma) > USUAL);
-        if is_unusual { self.believed } else { 1.0 }
-    }
-}
 
 /// Refines a pose without the inliers that agree with it by chance.
 pub(crate) fn refine_without_chance(

@@ -186,7 +186,7 @@ mod tests {
     use super::*;
     use crate::Correspondence;
     use crate::lanes::SearchScore as Score;
-    use crate::robust::conclude::chance_inliers::ByChance;
+    use crate::robust::conclude::by_chance::ByChance;
     use crate::robust::conclude::false_alarms;
     use crate::robust::refine::loss::HeavyTailed;
     use crate::robust::search::pose_score::PoseScorer;

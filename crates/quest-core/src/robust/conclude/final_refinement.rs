@@ -1,6 +1,6 @@
 //! The last refinement of a pose: over all of its inliers, with the noise that they show.
 
-use crate::robust::conclude::chance_inliers::ByChance;
+use crate::robust::conclude::by_chance::ByChance;
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::refine::loss::{HeavyTailed, Truncated};
 use crate::robust::refine::noise;

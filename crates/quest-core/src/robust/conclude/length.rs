@@ -10,7 +10,7 @@
 
 use nalgebra::{Vector3, Vector5};
 
-use crate::robust::conclude::chance_inliers::ByChance;
+use crate::robust::conclude::by_chance::ByChance;
 use crate::robust::conclude::inverse_depth::{Differentiated, InverseDepth};
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
@@ -26,8 +26,23 @@ const WELL: f64 = 2.0;
 /// More points are in front of the cameras than behind by so many standard deviations of a vote by chance.
 const BY_CHANCE: f64 = 2.0;
 
+/// The mean depth of points that are too far away to be clear is known to this share of it, as is the mean depth of points in units of
+/// the median inverse depth where depths differ.
+const UNKNOWN: f64 = 0.5;
+
+/// A point that is too far away to be clear counts as at most so many times as far away as most: one at infinity says nothing of a scene.
+const FARTHEST: f64 = 5.0;
+
 /// The share of depths that must stand clear.
 const MOST: f64 = 0.9;
+
+/// In per cent, how many of the values of a normal variable are less than its mean and so many deviations. With a higher quantile a few
+/// near points before distant ones would say that all differ.
+const QUARTILE: usize = 75;
+const DEVIATIONS: f64 = 0.6745;
+
+/// Depths that differ by a factor of e in one deviation; noise that is larger than the median inverse depth seems to be more.
+const MOST_SQUARE: f64 = 1.0;
 
 /// More matches than this are not looked at.
 const ENOUGH: usize = 2_000;
@@ -89,6 +104,11 @@ impl BothDepths {
         self.side() > 0.0
     }
 
+    /// About the depth of a point that is too far away to be clear: the median of what its inverse depth may be, as far as it is positive.
+    fn far(&self) -> f64 {
+        1.0 / positive(0.5 * self.sum(), self.variance).0.max(0.5 * self.variance.sqrt())
+    }
+
     /// One in front of both cameras, minus one behind both, zero where neither stands clear.
     fn side(&self) -> f64 {
         let [first, second] = [0, 1].map(|k| self.rho[k].value);
@@ -118,8 +138,8 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
         BothDepths::new(&observations.columns, index as usize, lengths, motion, noise.sigma)
     };
     let all: Vec<_> = some.iter().map(of_inlier).collect();
-    let clear: Vec<_> = all.iter().copied().filter(BothDepths::is_clear).collect();
-    if (clear.len() as f64) < MOST * all.len() as f64 {
+    let clear = all.iter().filter(|depth| depth.is_clear()).count();
+    if (clear as f64) < MOST * all.len() as f64 {
         return by_inverse_depths(&all);
     }
     let Noise { sigma, false_matches, by_chance } = *noise;
@@ -138,18 +158,36 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
         each: outliers / false_matches.len().max(1) as f64,
         missed: beyond(threshold / sigma),
     };
-    let well = seen_well(&clear);
-    let unseen = (all.len() - well.len()) as f64 / well.len() as f64;
-    by_depths(&well, &Chance { missed: chance.missed + unseen, ..chance })
+    let [well, badly] = seen_well_or_badly(all);
+    by_depths(&well, &badly, &chance)
 }
 
-/// Those of which a usual depth would stand clear with room to spare; all of them where there are few of these.
-fn seen_well(clear: &[BothDepths]) -> Vec<BothDepths> {
-    let mut sums: Vec<f64> = clear.iter().map(BothDepths::sum).collect();
+/// Those of which a usual depth would stand clear with room to spare, wherever their own is, and the others; those whose own stands
+/// clear where the first are few.
+fn seen_well_or_badly(all: Vec<BothDepths>) -> [Vec<BothDepths>; 2] {
+    let mut sums: Vec<f64> = all.iter().map(BothDepths::sum).collect();
     let usual = median(&mut sums);
     let limit = (0.5 * usual / (WELL * CLEAR)).powi(2);
-    let well: Vec<_> = clear.iter().copied().filter(|depth| depth.variance < limit).collect();
-    if 2 * well.len() < clear.len() { clear.to_vec() } else { well }
+    let is_well = |depth: &BothDepths| depth.variance < limit;
+    let count = all.iter().filter(|depth| is_well(depth)).count();
+    let (well, badly) = if 2 * count < all.len() {
+        all.into_iter().partition(BothDepths::is_clear)
+    } else {
+        all.into_iter().partition(is_well)
+    };
+    [well, badly]
+}
+
+/// The mean depth of points that are seen badly and its variance, by the median of their inverse depths where that stands clear of noise.
+fn mean_of_many(badly: &[BothDepths]) -> Option<(f64, f64)> {
+    let mut values: Vec<f64> = badly.iter().map(|depth| 0.5 * depth.sum()).collect();
+    if values.is_empty() {
+        return None;
+    }
+    let count = values.len() as f64;
+    let variance = MEDIAN_VARIANCE * badly.iter().map(|depth| depth.variance).sum::<f64>() / (count * count);
+    let rho = median(&mut values);
+    (rho > CLEAR * variance.sqrt()).then(|| (1.0 / rho, variance / rho.powi(4)))
 }
 
 /// The share of a normal variable beyond this many standard deviations, by the bound of Mills' ratio.
@@ -169,9 +207,15 @@ struct Chance {
 }
 
 /// The inverse of the mean of depths that are clear of noise.
-fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
+fn by_depths(all: &[BothDepths], badly: &[BothDepths], chance: &Chance) -> Length {
     let (mut sum, mut by_rotation, mut by_direction) = (0.0, Vector3::zeros(), Vector3::zeros());
+    let mut far = 0.0;
+    let farthest = FARTHEST / median(&mut all.iter().map(|depth| 0.5 * depth.sum()).collect::<Vec<_>>());
     for depth in all {
+        if !depth.is_clear() {
+            far += depth.far().min(farthest);
+            continue;
+        }
         // The mean of 1/ρ over the noise is (1 + relative variance)/ρ to second order.
         sum += depth.z() * (1.0 - depth.relative());
         for rho in &depth.rho {
@@ -180,18 +224,28 @@ fn by_depths(all: &[BothDepths], chance: &Chance) -> Length {
             by_direction += rho.by_direction * weight;
         }
     }
-    let count = all.len() as f64;
-    let value = count / sum;
+    let (mut count, others) = (all.len() as f64, badly.len() as f64);
+    let (mut missed, mut of_badly) = (chance.missed, 0.0);
+    if let Some((z, variance)) = mean_of_many(badly) {
+        sum += z * others;
+        count += others;
+        of_badly = variance * others * others;
+    } else {
+        missed += others / count;
+    }
+    let value = count / (sum + far);
     let square = |z: &f64| (z * value - 1.0).powi(2);
-    let of_noise: f64 =
-        all.iter().map(|depth| depth.variance * depth.z().powi(4)).sum::<f64>() * value * value;
-    let of_missed = chance.missed * all.iter().map(|depth| square(&depth.z())).sum::<f64>();
+    let clear = || all.iter().filter(|depth| depth.is_clear());
+    let of_noise: f64 = clear().map(|depth| depth.variance * depth.z().powi(4)).sum::<f64>() * value * value;
+    let of_missed = missed * clear().map(|depth| square(&depth.z())).sum::<f64>();
+    // What is common to those that are far is not known.
+    let of_far = ((UNKNOWN * far).powi(2) + of_badly) * value * value;
     let of_false = chance.each * chance.depths.iter().map(|(z, stays)| stays * square(z)).sum::<f64>();
     // d(n/Σz) = (n/Σz)² Σ z² dρ / n.
     let by_mean = value * value / count;
     Length {
         value,
-        variance: (of_noise + of_missed + of_false) * (value / count).powi(2),
+        variance: (of_noise + of_missed + of_false + of_far) * (value / count).powi(2),
         is_clear: true,
         by_rotation: by_rotation * by_mean,
         by_direction: by_direction * by_mean,
@@ -209,14 +263,31 @@ fn by_inverse_depths(all: &[BothDepths]) -> Length {
     let of_median = 0.5 * (median(&mut first) + median(&mut second));
     let variance = MEDIAN_VARIANCE * variance / (count * count);
     let (value, slope) = if are_in_front(all) { positive(of_median, variance) } else { (of_median, 1.0) };
+    let shorter = (-0.5 * square_of_logarithms(all, of_median)).exp();
+    let (value, slope) = (value * shorter, slope * shorter);
     let by_mean = slope / (2.0 * count);
     Length {
         value,
-        variance,
+        variance: variance * shorter * shorter + (UNKNOWN * value * (1.0 - shorter)).powi(2),
         is_clear: false,
         by_rotation: rhos().map(|rho| rho.by_rotation).sum::<Vector3<f64>>() * by_mean,
         by_direction: rhos().map(|rho| rho.by_direction).sum::<Vector3<f64>>() * by_mean,
     }
+}
+
+/// The variance of the logarithms of the depths, by the points that are nearer than their median: those stand clear first. With normal
+/// logarithms the mean depth is `exp(τ²/2)` times the inverse of the median inverse depth.
+fn square_of_logarithms(all: &[BothDepths], median_rho: f64) -> f64 {
+    if median_rho <= 0.0 {
+        return 0.0;
+    }
+    let mut beyond: Vec<f64> = all.iter().map(|depth| 0.5 * depth.sum() - median_rho).collect();
+    let at = QUARTILE * all.len() / 100;
+    let beyond = *beyond.select_nth_unstable_by(at, f64::total_cmp).1;
+    let mut noises: Vec<f64> = all.iter().map(|depth| depth.variance).collect();
+    let noise = median(&mut noises) * DEVIATIONS * DEVIATIONS;
+    let own = (beyond * beyond - noise).max(0.0).sqrt();
+    ((own / median_rho).ln_1p() / DEVIATIONS).powi(2).min(MOST_SQUARE)
 }
 
 /// Whether the points whose depths stand clear of their noise are in front, by more than chance.

@@ -5,7 +5,7 @@
 //! - There is one, with depths that follow a smooth field ([`depth_field`](crate::robust::conclude::depth_field)). Several
 //!   translations may explain the matches about as well.
 //!
-//! The weights are the likelihoods of all matches ([`evidence`](crate::robust::conclude::evidence)). A choice of one of the
+//! The weights are a power of the likelihoods of all matches ([`evidence`](crate::robust::conclude::evidence)). A choice of one of the
 //! explanations would have a covariance that knows nothing of the others; near the change from one to the other that is too
 //! small by orders of magnitude.
 
@@ -27,6 +27,13 @@ const STILL: f64 = 6.0;
 /// variance of the direction, in square radians and at most one. Measured at half a pixel: 79 to 83 % of poses are inside of
 /// their 95 % region without it, 85 to 91 % with it.
 const CURVED: f64 = 6.0;
+
+/// The power of the likelihoods that are the weights. Depths are not the smooth fields with normal spreads that they are taken for, so that
+/// the likelihood of thousands of matches is surer than it should be of which explanation is right (P. Grünwald, T. van Ommen,
+/// *Inconsistency of Bayesian inference for misspecified linear models, and a proposal for repairing it*, Bayesian Analysis
+/// 2017). Measured at 0.5 to 2 px of parallax, beside a power of one: the squared errors in units of the covariance fall from 1.3 to 1.1
+/// times their expectation, and the rotation is up to a tenth closer. Powers of 0.35 to 0.5 differ little.
+const POWER: f64 = 0.5;
 
 /// The rotation explains a match that is within this many standard deviations of where it takes the point. With
 /// the tails of [`evidence`](crate::robust::conclude::evidence) one true match in fourteen is beyond three, one in seventy beyond six.
@@ -99,11 +106,11 @@ fn of_mode(fit: &Fit, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vec
     let along = fit.at.t_21.dot(&(block * fit.at.t_21)) / square;
     let direction = ((block.trace() - along) / square).clamp(0.0, 1.0);
     let scale = 1.0 / fit.at.unit();
-    Component {
-        nats: fit.nats,
-        mean: after(&fit.at.q_21, fit.at.t_21 * (scale * (1.0 - 0.5 * direction))),
-        covariance: in_unit(&fit.covariance, scale) * (1.0 + CURVED * direction),
-    }
+    let t_21 = fit.at.t_21 * (scale * (1.0 - 0.5 * direction));
+    let mut covariance = in_unit(&fit.covariance, scale) * (1.0 + CURVED * direction);
+    let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
+    block += t_21 * t_21.transpose() * fit.at.unit_variance();
+    Component { nats: fit.nats, mean: after(&fit.at.q_21, t_21), covariance }
 }
 
 /// The same with the best rotation alone and the translation that is the likeliest with it. As long as no translation is evident,
@@ -129,7 +136,7 @@ pub(crate) fn of_length((pose, covariance): Distribution, length: f64) -> Distri
 /// The mean and the covariance of a mixture.
 fn merged(q_21: &UnitQuaternion<f64>, all: &[Component]) -> Distribution {
     let most = all.iter().map(|c| c.nats).fold(f64::NEG_INFINITY, f64::max);
-    let weight = |c: &Component| (c.nats - most).exp();
+    let weight = |c: &Component| (POWER * (c.nats - most)).exp();
     let sum: f64 = all.iter().map(weight).sum();
     let mean: Vector6<f64> = all.iter().map(|c| c.mean * (weight(c) / sum)).sum();
     let spread = |c: &Component| c.covariance + (c.mean - mean) * (c.mean - mean).transpose();

@@ -2,6 +2,7 @@
 //! the translation, the covariance.
 
 mod alternatives;
+mod by_chance;
 mod chance_inliers;
 mod covariance;
 mod depth_field;

@@ -8,7 +8,7 @@ use crate::robust::MIN_MATCHES;
 use crate::robust::conclude::alternatives::{
     Alternative, as_likely, both_of_plane, distance, is_same, second_of_few,
 };
-use crate::robust::conclude::chance_inliers::ByChance;
+use crate::robust::conclude::by_chance::ByChance;
 use crate::robust::conclude::covariance;
 use crate::robust::conclude::final_refinement::Polished;
 use crate::robust::conclude::length::{Length, Noise, length};
@@ -60,35 +60,35 @@ pub(crate) fn report(
     answer: Answer,
 ) -> Option<Estimate> {
     let observations = poses.observations;
-    let (motion, mut second) = chosen(answer, answers(poses, found, &conclusion));
+    let (motion, second) = chosen(answer, answers(poses, found, &conclusion));
     let Conclusion { mut polished, small, plane, verdict, false_matches, false_share, .. } = conclusion;
-    let (model, sigma) = (verdict.model, polished.sigma);
+    let (model, sigma, is_best) = (verdict.model, polished.sigma, matches!(answer, Answer::Best));
     polished.pose = poses.score(motion, poses.threshold());
     // Of a small motion the likelihood says which they are.
-    if small.is_some() || !matches!(answer, Answer::Best) {
+    if small.is_some() || !is_best {
         polished.by_chance = ByChance::unknown();
     }
     let by_chance = polished.by_chance.clone();
     polished.pose.inliers.retain(|i| !by_chance.matches.contains(i));
     // The motions of an exact plane have a covariance of their own.
     let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
-    let small = small.filter(|_| !is_of_plane && matches!(answer, Answer::Best)).map(|small| match model {
+    let small = small.filter(|_| !is_of_plane && is_best).map(|small| match model {
         Model::Planar => small.without_twins(),
         _ => small,
     });
     if let Some(small) = &small {
         polished.pose.inliers.retain(|&i| small.is_likely[i as usize]);
     } else if model == Model::PureRotation {
-        let r_21 = verdict.q_21.to_rotation_matrix().into_inner();
-        let limit = (NEAR_POINT * poses.threshold()).powi(2);
-        let mut squares = observations.framed(&polished.pose.inliers).square_errors(&r_21).into_iter();
-        polished.pose.inliers.retain(|_| squares.next().is_some_and(|square| square < limit));
+        retain_near_points(
+            observations,
+            &verdict.q_21,
+            NEAR_POINT * poses.threshold(),
+            &mut polished.pose.inliers,
+        );
     }
     let inliers = &polished.pose.inliers;
     // A plane, a rotation, or one of the poses of few matches may be left with less than it takes.
-    if inliers.len() < MIN_MATCHES {
-        return None;
-    }
+    (inliers.len() >= MIN_MATCHES).then_some(())?;
     let noise = Noise { sigma, false_matches, by_chance: &by_chance };
     let size = length(observations, &motion, inliers, &noise);
     let pose = with_length(&motion, size);
@@ -103,22 +103,18 @@ pub(crate) fn report(
         let open = || matches!(answer, Answer::Given(_)).then(|| covariance::of_nothing(&pose));
         (pose, known.or_else(open)?)
     };
-    match (&small, model) {
-        (Some(small), Model::General) => second = small.other_mode(&pose.t_21).or(second),
+    let second = match (&small, model) {
+        (Some(small), Model::General) => small.other_mode(&pose.t_21).or(second),
         // The likelihood may have chosen the other motion of the plane.
-        (Some(_), Model::Planar) => second = farther(&pose, [Some(motion), second]),
-        _ => {}
-    }
-    let mut mask = vec![false; observations.given];
-    for &i in inliers {
-        mask[observations.order[i as usize]] = true;
-    }
+        (Some(_), Model::Planar) => farther(&pose, [Some(motion), second]),
+        _ => second,
+    };
     Some(Estimate {
         model,
         pose,
         covariance,
         inlier_count: inliers.len(),
-        inliers: mask,
+        inliers: mask(observations, inliers),
         score: share(&polished.pose.scored, observations),
         iterations: found.iterations,
         runner_up: second.map(|motion| runner_up(poses, motion, &noise)),
@@ -128,6 +124,27 @@ pub(crate) fn report(
         false_share,
         unmoved: 0,
     })
+}
+
+/// Whether each match that was given is an inlier.
+fn mask(observations: &Observations, inliers: &[u32]) -> Vec<bool> {
+    let mut mask = vec![false; observations.given];
+    for &i in inliers {
+        mask[observations.order[i as usize]] = true;
+    }
+    mask
+}
+
+/// Leaves only the matches within so many pixels of the point that a rotation takes them to.
+fn retain_near_points(
+    observations: &Observations,
+    q_21: &UnitQuaternion<f64>,
+    limit: f64,
+    inliers: &mut Vec<u32>,
+) {
+    let r_21 = q_21.to_rotation_matrix().into_inner();
+    let mut squares = observations.framed(inliers).square_errors(&r_21).into_iter();
+    inliers.retain(|_| squares.next().is_some_and(|square| square < limit * limit));
 }
 
 /// Of two motions the one that is farther from a pose, where that is another.

@@ -69,7 +69,7 @@ const MOST_BY_CHANCE: usize = 5;
 const STARTS: usize = 7;
 const EXPLORED: usize = 250;
 const EXPLORING_ROUNDS: usize = 8;
-const FIELD_ROUNDS: usize = 8;
+const FIELD_ROUNDS: usize = 10;
 
 /// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.0003.
 const MODES: usize = 4;

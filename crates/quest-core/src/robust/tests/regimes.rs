@@ -171,8 +171,8 @@ fn points_near_the_epipole_do_not_make_a_translation_longer() {
         let length = planted.truth.t_21.norm() * 2.0 * planted.count as f64 / planted.depths;
         sum += found.pose.t_21.norm() / length - 1.0;
     }
-    // One estimate scatters by 1 %. Where only the near ones of those points counted the mean was 1.4 %.
-    assert!((sum / 20.0).abs() < 0.007, "{}", sum / 20.0);
+    // One estimate scatters by 1 %. Where only the near ones of those points counted the mean was 1.8 %.
+    assert!((sum / 20.0).abs() < 0.01, "{}", sum / 20.0);
 }
 
 #[test]
