@@ -33,8 +33,8 @@ const ROUNDS: usize = 3;
 /// Steps of a refinement.
 const STEPS: usize = 10;
 
-/// The share of `p(ρ)` that is farther away than that: `2 ∫ 3√3 / (4π (1 + u³)) du`.
-const UNUSUAL: f64 = 0.0452;
+/// The share of `p(ρ)` beyond [`USUAL`]: `2 ∫ 3√3 / (4π (1 + u³)) du`.
+const TAIL: f64 = 0.0452;
 
 /// False matches are counted within so many times the threshold, where there are more of them to count.
 const WIDE: f64 = 3.0;
@@ -91,7 +91,7 @@ fn unusual_depths(observations: &Observations, polished: &Polished, false_matche
     let each = (observations.len() - inliers.len()) as f64 / (WIDE * false_matches.len().max(1) as f64);
     let by_chance = count(&InverseDepth::all(false_matches, motion, &agreeing)) * each;
     let more = count(&depths) - by_chance;
-    (usual, (more / (UNUSUAL * inliers.len() as f64)).clamp(0.0, 1.0))
+    (usual, (more / (TAIL * inliers.len() as f64)).clamp(0.0, 1.0))
 }
 
 /// The inliers that are more likely false than true.

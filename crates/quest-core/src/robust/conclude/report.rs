@@ -68,8 +68,7 @@ pub(crate) fn report(
     if small.is_some() || !is_best {
         polished.by_chance = ByChance::unknown();
     }
-    let by_chance = polished.by_chance.clone();
-    polished.pose.inliers.retain(|i| !by_chance.matches.contains(i));
+    polished.pose.inliers.retain(|i| !polished.by_chance.matches.contains(i));
     // The motions of an exact plane have a covariance of their own.
     let is_of_plane = model == Model::Planar && verdict.is_exact_plane;
     let small = small.filter(|_| !is_of_plane && is_best).map(|small| match model {
@@ -79,17 +78,14 @@ pub(crate) fn report(
     if let Some(small) = &small {
         polished.pose.inliers.retain(|&i| small.is_likely[i as usize]);
     } else if model == Model::PureRotation {
-        retain_near_points(
-            observations,
-            &verdict.q_21,
-            NEAR_POINT * poses.threshold(),
-            &mut polished.pose.inliers,
-        );
+        retain_near_points(observations, &verdict.q_21, &mut polished.pose.inliers);
     }
     let inliers = &polished.pose.inliers;
     // A plane, a rotation, or one of the poses of few matches may be left with less than it takes.
-    (inliers.len() >= MIN_MATCHES).then_some(())?;
-    let noise = Noise { sigma, false_matches, by_chance: &by_chance };
+    if inliers.len() < MIN_MATCHES {
+        return None;
+    }
+    let noise = Noise { sigma, false_matches, by_chance: &polished.by_chance };
     let size = length(observations, &motion, inliers, &noise);
     let pose = with_length(&motion, size);
     let (pose, covariance) = if let Some(small) = &small {
@@ -135,13 +131,9 @@ fn mask(observations: &Observations, inliers: &[u32]) -> Vec<bool> {
     mask
 }
 
-/// Leaves only the matches within so many pixels of the point that a rotation takes them to.
-fn retain_near_points(
-    observations: &Observations,
-    q_21: &UnitQuaternion<f64>,
-    limit: f64,
-    inliers: &mut Vec<u32>,
-) {
+/// Leaves only the matches near the point that a rotation takes them to.
+fn retain_near_points(observations: &Observations, q_21: &UnitQuaternion<f64>, inliers: &mut Vec<u32>) {
+    let limit = NEAR_POINT * observations.columns.threshold();
     let r_21 = q_21.to_rotation_matrix().into_inner();
     let mut squares = observations.framed(inliers).square_errors(&r_21).into_iter();
     inliers.retain(|_| squares.next().is_some_and(|square| square < limit * limit));

@@ -71,7 +71,8 @@ const EXPLORED: usize = 250;
 const EXPLORING_ROUNDS: usize = 8;
 const FIELD_ROUNDS: usize = 10;
 
-/// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.0003.
+/// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.02
+/// (the [power](crate::robust::conclude::mixture) of its likelihood).
 const MODES: usize = 4;
 const UNLIKELY: f64 = 8.0;
 
