@@ -219,7 +219,7 @@ fn what_is_no_calibration_says_what_it_is() {
     let focal = k("0, 0, 2, 0, 3, 4, 0, 0, 1");
     assert!(focal.starts_with("a.yaml: K: focal length fx of the camera is 0 pixels"), "{focal}");
     let three = ROS.replace("MODEL", "plumb_bob").replace(", 0.004]", "]");
-    let count = "found 3 coefficients, expected 0, 4, 5, 8, 12 or 14";
+    let count = "found 3 coefficients of the distortion, expected 0, 4, 5, 8, 12 or 14";
     assert_eq!(refused("a.yaml", three, None), format!("a.yaml: distortion_coefficients: {count}"));
     let model = "distortion_model: found \"omni\", expected plumb_bob, rational_polynomial or equidistant";
     assert_eq!(refused("a.yaml", ROS.replace("MODEL", "omni"), None), format!("a.yaml: {model}"));

@@ -115,31 +115,7 @@ pub(crate) fn opencv(
 ) -> PyResult<Camera> {
     let ((fx, fy), (cx, cy)) = (pinhole.focal_lengths(), pinhole.principal_point());
     let k = [fx, fy, cx, cy];
-    let (model, params) = match (fisheye, dist) {
-        (false, []) => (CameraModel::Pinhole, k.to_vec()),
-        (true, []) => (CameraModel::OpenCvFisheye, [&k[..], &[0.0; 4]].concat()),
-        (true, &[_, _, _, _]) => (CameraModel::OpenCvFisheye, [&k[..], dist].concat()),
-        (false, &[_, _, _, _]) => (CameraModel::OpenCv, [&k[..], dist].concat()),
-        (false, &[k1, k2, p1, p2, k3]) => {
-            (CameraModel::FullOpenCv, [&k[..], &[k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]].concat())
-        }
-        (false, &[_, _, _, _, _, _, _, _, ref rest @ ..]) if matches!(rest.len(), 0 | 4 | 6) => {
-            if let Some(found) = rest.iter().find(|x| **x != 0.0) {
-                return Err(BadCamera::new_err(format!(
-                    "{name}: dist holds {found} for thin prism or tilt, expected zero: undistort the points with OpenCV"
-                )));
-            }
-            (CameraModel::FullOpenCv, [&k[..], &dist[..8]].concat())
-        }
-        (_, found) => {
-            let expected = if fisheye { "0 or 4" } else { "0, 4, 5, 8, 12 or 14" };
-            return Err(BadCamera::new_err(format!(
-                "{name}: dist has {} coefficients, expected {expected}",
-                found.len()
-            )));
-        }
-    };
-    let camera = Camera::new(model, &params).map_err(|error| errors::camera(name, &error))?;
+    let camera = Camera::from_opencv(k, dist, fisheye).map_err(|error| errors::camera(name, &error))?;
     match size {
         Some((width, height)) => camera.with_size(width, height).map_err(|e| errors::camera(name, &e)),
         None => Ok(camera),

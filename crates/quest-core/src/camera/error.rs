@@ -71,6 +71,20 @@ pub enum CameraError {
         /// What stands there in a calibration matrix without skew.
         expected: f64,
     },
+    /// OpenCV's distortion has no such number of coefficients.
+    #[error("found {found} coefficients of the distortion, expected {expected}")]
+    DistortionCount {
+        /// How many were given.
+        found: usize,
+        /// How many there may be.
+        expected: &'static str,
+    },
+    /// A coefficient of OpenCV's thin prism or tilted sensor is not zero.
+    #[error("found {found} for thin prism or tilt, expected zero: undistort the points with OpenCV")]
+    ThinPrism {
+        /// What was found.
+        found: f64,
+    },
     /// A coordinate of a pixel, or of a point to be projected, is NaN or infinite.
     #[error("a coordinate is {found}, expected a finite number")]
     NotFinite {

@@ -175,6 +175,34 @@ impl Camera {
         Self::new(CameraModel::Pinhole, &[k[(0, 0)], k[(1, 1)], k[(0, 2)], k[(1, 2)]])
     }
 
+    /// The camera of OpenCV's calibration: focal lengths and principal point `fx, fy, cx, cy` in pixels, and the coefficients of
+    /// the distortion in OpenCV's order. A fisheye has none or four, other cameras none, 4, 5, 8, 12 or 14.
+    ///
+    /// # Errors
+    /// [`CameraError::DistortionCount`], [`CameraError::ThinPrism`] where a coefficient after the eighth is not zero, and those of
+    /// [`Camera::new`].
+    pub fn from_opencv(k: [f64; 4], distortion: &[f64], is_fisheye: bool) -> Result<Self, CameraError> {
+        let (model, used) = match (is_fisheye, distortion.len()) {
+            (false, 0) => (CameraModel::Pinhole, 0),
+            (true, 0 | 4) => (CameraModel::OpenCvFisheye, 4),
+            (false, 4) => (CameraModel::OpenCv, 4),
+            (false, 5 | 8 | 12 | 14) => (CameraModel::FullOpenCv, 8),
+            (_, found) => {
+                let expected = if is_fisheye { "0 or 4" } else { "0, 4, 5, 8, 12 or 14" };
+                return Err(CameraError::DistortionCount { found, expected });
+            }
+        };
+        if let Some(&found) = distortion.iter().skip(used).find(|x| **x != 0.0) {
+            return Err(CameraError::ThinPrism { found });
+        }
+        // The coefficients that are not given are zero.
+        let mut params = [0.0; 12];
+        params[..4].copy_from_slice(&k);
+        let given = distortion.len().min(used);
+        params[4..4 + given].copy_from_slice(&distortion[..given]);
+        Self::new(model, &params[..4 + used])
+    }
+
     /// The camera with the size of its images in pixels. No computation needs the size.
     ///
     /// # Errors

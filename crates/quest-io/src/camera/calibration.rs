@@ -1,8 +1,8 @@
 //! A calibration as a camera: the matrix, the coefficients of OpenCV's distortion, the size of the image.
 
-use quest_core::{Camera, CameraModel};
+use quest_core::{Camera, CameraError};
 
-use super::{camera as by_name, keys::Keys};
+use super::keys::Keys;
 use crate::error::Fault;
 
 const MATRIX: [&str; 3] = ["camera_matrix", "K", "M"];
@@ -32,10 +32,14 @@ pub(super) fn camera(keys: &Keys, id: Option<&str>) -> Result<Camera, Refusal> {
         Some((name, values)) => numbers(name, values)?,
         None => Vec::new(),
     };
-    let (model, params) = opencv(k, &distortion, is_fisheye(keys, id)?)
-        .map_err(|message| (Some(DISTORTION[0].to_owned()), Fault::Calibration(message)))?;
-    let size = size(keys, id)?;
-    by_name(model.name(), size, &params).map_err(|error| (Some(name.to_owned()), error.into()))
+    let camera = Camera::from_opencv(k, &distortion, is_fisheye(keys, id)?).map_err(|error| {
+        let is_distortion = matches!(error, CameraError::DistortionCount { .. } | CameraError::ThinPrism { .. });
+        (Some(if is_distortion { DISTORTION[0] } else { name }.to_owned()), error.into())
+    })?;
+    match size(keys, id)? {
+        Some((width, height)) => camera.with_size(width, height).map_err(|error| (Some(name.to_owned()), error.into())),
+        None => Ok(camera),
+    }
 }
 
 fn numbers(name: &str, values: &[String]) -> Result<Vec<f64>, Refusal> {
@@ -108,30 +112,4 @@ fn size(keys: &Keys, id: Option<&str>) -> Result<Option<(u32, u32)>, Refusal> {
         [width, height] => Ok(Some((width, height))),
         _ => Err((Some(SIZE[0].to_owned()), Fault::HalfASize)),
     }
-}
-
-/// COLMAP's model with OpenCV's coefficients.
-fn opencv(k: [f64; 4], distortion: &[f64], is_fisheye: bool) -> Result<(CameraModel, Vec<f64>), String> {
-    let with = |rest: &[f64]| [&k[..], rest].concat();
-    Ok(match (is_fisheye, distortion) {
-        (false, []) => (CameraModel::Pinhole, with(&[])),
-        (true, []) => (CameraModel::OpenCvFisheye, with(&[0.0; 4])),
-        (true, [_, _, _, _]) => (CameraModel::OpenCvFisheye, with(distortion)),
-        (false, [_, _, _, _]) => (CameraModel::OpenCv, with(distortion)),
-        (false, [_, _, _, _, k3]) => {
-            (CameraModel::FullOpenCv, with(&[&distortion[..4], &[*k3, 0.0, 0.0, 0.0]].concat()))
-        }
-        (false, [_, _, _, _, _, _, _, _, rest @ ..]) if matches!(rest.len(), 0 | 4 | 6) => {
-            if let Some(found) = rest.iter().find(|x| **x != 0.0) {
-                return Err(format!(
-                    "found {found} for thin prism or tilt, expected zero: undistort the points with OpenCV"
-                ));
-            }
-            (CameraModel::FullOpenCv, with(&distortion[..8]))
-        }
-        (_, found) => {
-            let expected = if is_fisheye { "0 or 4" } else { "0, 4, 5, 8, 12 or 14" };
-            return Err(format!("found {} coefficients, expected {expected}", found.len()));
-        }
-    })
 }

@@ -57,6 +57,34 @@ fn a_matrix_that_is_not_a_calibration_matrix_is_refused() {
 }
 
 #[test]
+fn coefficients_of_opencv_are_counted() {
+    let k = [600.0, 610.0, 320.0, 240.0];
+    let of = |count: usize| (0..count).map(|i| if i < 8 { 0.01 * i as f64 } else { 0.0 }).collect::<Vec<_>>();
+    for (is_fisheye, count, model, used) in [
+        (false, 0, CameraModel::Pinhole, 0),
+        (false, 4, CameraModel::OpenCv, 4),
+        (false, 5, CameraModel::FullOpenCv, 8),
+        (false, 8, CameraModel::FullOpenCv, 8),
+        (false, 12, CameraModel::FullOpenCv, 8),
+        (false, 14, CameraModel::FullOpenCv, 8),
+        (true, 0, CameraModel::OpenCvFisheye, 4),
+        (true, 4, CameraModel::OpenCvFisheye, 4),
+    ] {
+        let camera = Camera::from_opencv(k, &of(count), is_fisheye).unwrap();
+        let mut params = [&k[..], &of(count)].concat();
+        params.resize(4 + used, 0.0);
+        assert_eq!(camera, Camera::new(model, &params).unwrap());
+    }
+    for (is_fisheye, found, expected) in [(false, 3, "0, 4, 5, 8, 12 or 14"), (true, 5, "0 or 4")] {
+        let error = Camera::from_opencv(k, &of(found), is_fisheye).unwrap_err();
+        assert_eq!(error, CameraError::DistortionCount { found, expected });
+    }
+    let mut prism = of(12);
+    prism[9] = 0.5;
+    assert_eq!(Camera::from_opencv(k, &prism, false), Err(CameraError::ThinPrism { found: 0.5 }));
+}
+
+#[test]
 fn an_image_without_pixels_is_refused() {
     let error = pinhole().with_size(640, 0).unwrap_err();
     assert_eq!(error.to_string(), "the size of the image is 640 x 0, expected at least 1 x 1");

@@ -172,9 +172,12 @@ impl DepthField {
         (1.0 - self.near) * usual + self.near * self.near_depth
     }
 
-    /// The variance of that unit over its square: it is known to half of what the spread of the inverse depths and near points make of it.
+    /// The variance of that unit over its square. `1 + v`, with `v` the squared relative deviation of the inverse depths, is exact for
+    /// logarithms that are normal. Depths that are uniform between two bounds have half of `v²` more or less, those of other
+    /// shapes about `v²`; the share of near points is known to a half.
     pub(crate) fn unit_variance(&self) -> f64 {
-        (0.5 * (self.square_spread + self.field.norm_squared() + self.near)).powi(2)
+        let square = self.square_spread + self.field.norm_squared();
+        (square * square).powi(2) + (0.5 * self.near).powi(2)
     }
 
     /// By what share of their mean inverse depths differ from those of a plane, which are linear in the image.
