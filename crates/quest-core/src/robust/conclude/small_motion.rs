@@ -64,11 +64,13 @@ const LIKELY: f64 = 0.5;
 /// At most one in so many inliers is one by chance. Where more seem to be, the likelihood does not fit the matches.
 const MOST_BY_CHANCE: usize = 5;
 
-/// The depth fields begin from so many minima. Some matches and rounds compare them; those that are left have more rounds, with
-/// all matches.
-const STARTS: usize = 7;
+/// The depth fields begin from so many minima. A few rounds with some of the matches compare them, since without a field the
+/// evidence of a corridor's true motion is low; the best of them have more rounds, and those that are left have all matches.
+const STARTS: usize = 24;
+const GLIMPSE_ROUNDS: usize = 3;
+const GOOD_STARTS: usize = 7;
 const EXPLORED: usize = 250;
-const EXPLORING_ROUNDS: usize = 8;
+const EXPLORING_ROUNDS: usize = 6;
 const FIELD_ROUNDS: usize = 10;
 
 /// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.02
@@ -213,7 +215,7 @@ fn modes(
     of_some: &Likelihood,
     of_many: &Likelihood,
 ) -> Vec<Fit> {
-    let fitted = |starts: Vec<DepthField>, likelihood: &Likelihood, rounds: usize| {
+    let fitted = |starts: Vec<DepthField>, likelihood: &Likelihood, rounds: usize, most: usize| {
         let terms = depth_field::terms(likelihood, q_21);
         let mut fits: Vec<Fit> =
             starts.into_iter().filter_map(|start| start.fit(&terms, likelihood, rounds)).collect();
@@ -221,12 +223,17 @@ fn modes(
         let mut distinct: Vec<Fit> = Vec::new();
         for fit in fits {
             let is_known = distinct.iter().any(|other| fit.at.is_near(other));
-            let is_likely = distinct.first().is_none_or(|best| fit.nats > best.nats - UNLIKELY);
-            if is_likely && !is_known && distinct.len() < MODES {
+            if !is_known && distinct.len() < most {
                 distinct.push(fit);
             }
         }
         distinct
+    };
+    let ends = |fits: Vec<Fit>| fits.into_iter().map(|fit| fit.at).collect::<Vec<_>>();
+    let likely = |mut fits: Vec<Fit>| {
+        let most = fits.first().map_or(0.0, |fit| fit.nats);
+        fits.retain(|fit| fit.nats > most - UNLIKELY);
+        fits
     };
     let mut starts = vec![DepthField::start(*q_21, Vector3::zeros(), EVEN)];
     starts.extend(distinct(minima).iter().map(|minimum| {
@@ -234,8 +241,9 @@ fn modes(
         let t_21 = minimum.motion.direction * minimum.mean_depth.max(least_depth);
         DepthField::start(minimum.motion.q_21, t_21, USUAL)
     }));
-    let explored = fitted(starts, of_some, EXPLORING_ROUNDS);
-    fitted(explored.into_iter().map(|fit| fit.at).collect(), of_many, FIELD_ROUNDS)
+    let good = ends(fitted(starts, of_some, GLIMPSE_ROUNDS, GOOD_STARTS));
+    let explored = ends(likely(fitted(good, of_some, EXPLORING_ROUNDS, MODES)));
+    likely(fitted(explored, of_many, FIELD_ROUNDS, MODES))
 }
 
 /// The likeliest minima whose directions differ.
