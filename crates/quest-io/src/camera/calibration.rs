@@ -33,11 +33,14 @@ pub(super) fn camera(keys: &Keys, id: Option<&str>) -> Result<Camera, Refusal> {
         None => Vec::new(),
     };
     let camera = Camera::from_opencv(k, &distortion, is_fisheye(keys, id)?).map_err(|error| {
-        let is_distortion = matches!(error, CameraError::DistortionCount { .. } | CameraError::ThinPrism { .. });
+        let is_distortion =
+            matches!(error, CameraError::DistortionCount { .. } | CameraError::ThinPrism { .. });
         (Some(if is_distortion { DISTORTION[0] } else { name }.to_owned()), error.into())
     })?;
     match size(keys, id)? {
-        Some((width, height)) => camera.with_size(width, height).map_err(|error| (Some(name.to_owned()), error.into())),
+        Some((width, height)) => {
+            camera.with_size(width, height).map_err(|error| (Some(name.to_owned()), error.into()))
+        }
         None => Ok(camera),
     }
 }

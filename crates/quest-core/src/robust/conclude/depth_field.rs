@@ -82,12 +82,14 @@ pub(crate) struct DepthField {
     near_depth: f64,
 }
 
-/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`.
+/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`, with the translation
+/// in its unit and in units of the mean depth.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) at: DepthField,
     pub(crate) nats: f64,
     pub(crate) covariance: Matrix6<f64>,
+    pub(crate) covariance_by_depth: Matrix6<f64>,
 }
 
 /// What a round sums up.
@@ -224,11 +226,27 @@ impl DepthField {
             self = before;
             sums = self.round(terms, likelihood);
         }
-        let covariance = regularised(&sums, &precisions)?.inverse();
+        let all = regularised(&sums, &precisions)?.inverse();
+        let covariance: Matrix6<f64> = all.fixed_view::<6, 6>(0, 0).into_owned();
+        let by_depth = self.by_depth();
+        let covariance_by_depth = by_depth * all * by_depth.transpose();
         let nats = without_two(sums.nats) - self.surprise(&precisions);
-        let covariance: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into_owned();
-        let is_finite = nats.is_finite() && covariance.iter().all(|x| x.is_finite());
-        is_finite.then_some(Fit { at: self, nats, covariance })
+        let is_finite =
+            nats.is_finite() && covariance_by_depth.iter().chain(&covariance).all(|x| x.is_finite());
+        is_finite.then_some(Fit { at: self, nats, covariance, covariance_by_depth })
+    }
+
+    /// The derivative of the pose, with its translation in units of the mean depth, by all parameters: the coefficients of the field
+    /// change the unit.
+    fn by_depth(&self) -> SMatrix<f64, 6, PARAMETERS> {
+        let unit = self.unit();
+        let of_field = self.field * (2.0 * (1.0 - self.near));
+        let mut derivative = SMatrix::<f64, 6, PARAMETERS>::identity();
+        derivative.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(1.0 / unit);
+        derivative
+            .fixed_view_mut::<3, TERMS>(3, 6)
+            .copy_from(&(self.t_21 * of_field.transpose() * (-1.0 / (unit * unit))));
+        derivative
     }
 
     /// The logarithm of the likelihood and of what is known of the field before any match is seen, which the rounds increase.

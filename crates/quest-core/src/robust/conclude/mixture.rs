@@ -107,7 +107,7 @@ fn of_mode(fit: &Fit, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vec
     let direction = ((block.trace() - along) / square).clamp(0.0, 1.0);
     let scale = 1.0 / fit.at.unit();
     let t_21 = fit.at.t_21 * (scale * (1.0 - 0.5 * direction));
-    let mut covariance = in_unit(&fit.covariance, scale) * (1.0 + CURVED * direction);
+    let mut covariance = fit.covariance_by_depth * (1.0 + CURVED * direction);
     let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
     block += t_21 * t_21.transpose() * fit.at.unit_variance();
     Component { nats: fit.nats, mean: after(&fit.at.q_21, t_21), covariance }

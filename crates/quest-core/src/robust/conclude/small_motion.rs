@@ -73,10 +73,14 @@ const EXPLORED: usize = 250;
 const EXPLORING_ROUNDS: usize = 6;
 const FIELD_ROUNDS: usize = 10;
 
-/// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.02
-/// (the [power](crate::robust::conclude::mixture) of its likelihood).
-const MODES: usize = 4;
-const UNLIKELY: f64 = 8.0;
+/// So many modes are kept at most. A mode that is less likely than the likeliest by so many nats has a weight of 0.001 (the
+/// [power](crate::robust::conclude::mixture) of its likelihood). Some of the matches tell less surely which are.
+const MODES: usize = 6;
+const UNLIKELY: f64 = 14.0;
+const UNLIKELY_OF_SOME: f64 = 16.0;
+
+/// Where the essential matrix explains the matches better by so many nats, the depths are no smooth field.
+const NO_FIELD: f64 = 8.0;
 
 /// The second pose is a mode that is less likely by at most so many nats, a twentieth, and whose direction is so far away, 20°.
 const AS_LIKELY: f64 = 3.0;
@@ -201,7 +205,7 @@ pub(crate) fn look(
     let least_depth = sigma / observations.columns.focal_length();
     let mut modes = modes(&q_21, &minima, least_depth, &likelihood(EXPLORED), &weighed);
     // Where none explains the matches as well as the essential matrix does, the depths are of another kind.
-    modes.retain(|mode| mode.nats > nats - UNLIKELY);
+    modes.retain(|mode| mode.nats > nats - NO_FIELD);
     let nats = modes.first().map_or(nats, |mode| mode.nats.max(nats));
     (polished, Some(SmallMotion { q_21, excess, nats, sigma, is_likely, modes }))
 }
@@ -230,9 +234,9 @@ fn modes(
         distinct
     };
     let ends = |fits: Vec<Fit>| fits.into_iter().map(|fit| fit.at).collect::<Vec<_>>();
-    let likely = |mut fits: Vec<Fit>| {
+    let likely = |mut fits: Vec<Fit>, unlikely: f64| {
         let most = fits.first().map_or(0.0, |fit| fit.nats);
-        fits.retain(|fit| fit.nats > most - UNLIKELY);
+        fits.retain(|fit| fit.nats > most - unlikely);
         fits
     };
     let mut starts = vec![DepthField::start(*q_21, Vector3::zeros(), EVEN)];
@@ -242,8 +246,8 @@ fn modes(
         DepthField::start(minimum.motion.q_21, t_21, USUAL)
     }));
     let good = ends(fitted(starts, of_some, GLIMPSE_ROUNDS, GOOD_STARTS));
-    let explored = ends(likely(fitted(good, of_some, EXPLORING_ROUNDS, MODES)));
-    likely(fitted(explored, of_many, FIELD_ROUNDS, MODES))
+    let explored = ends(likely(fitted(good, of_some, EXPLORING_ROUNDS, MODES), UNLIKELY_OF_SOME));
+    likely(fitted(explored, of_many, FIELD_ROUNDS, MODES), UNLIKELY)
 }
 
 /// The likeliest minima whose directions differ.
