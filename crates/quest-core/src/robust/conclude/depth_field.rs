@@ -60,6 +60,12 @@ const FREE: f64 = 4.0;
 /// A step may lower the likelihood by so many nats: one that is longer than that of EM overshoots a little near the limit.
 const LOST: f64 = 1.0;
 
+/// A point counts as at most so many times as far away as most: one at infinity says nothing of a scene.
+const FARTHEST_POINT: f64 = 5.0;
+
+/// Which points are near is known to this share of them.
+const UNKNOWN: f64 = 0.5;
+
 /// This share of the diagonal is added to the normal equations, which are singular without a translation: the field moves no point.
 const RIDGE: f64 = 1e-9;
 
@@ -78,18 +84,46 @@ pub(crate) struct DepthField {
     /// `s²`.
     square_spread: f64,
     near: f64,
-    /// The mean depth of near points.
-    near_depth: f64,
 }
 
-/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`, with the translation
-/// in its unit and in units of the mean depth.
+/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) at: DepthField,
     pub(crate) nats: f64,
     pub(crate) covariance: Matrix6<f64>,
+    /// The mean depth in the unit of the translation, and the covariance with the translation in units of the mean depth.
+    pub(crate) mean_depth: f64,
     pub(crate) covariance_by_depth: Matrix6<f64>,
+}
+
+/// A match under a motion with a field of depths.
+struct Placed {
+    /// By how much the match moves along its epipolar line, by a unit of inverse depth, and in which direction.
+    length: f64,
+    u: [f64; 2],
+    /// What the field says of its inverse depth, and what the match says.
+    mean: f64,
+    depth: f64,
+    across: f64,
+    away: f64,
+    /// The part of what the match says in what is known of its inverse depth.
+    share: f64,
+    explained: Explained,
+}
+
+impl Placed {
+    /// The inverse depth that the match is likeliest to have, as a point of the field.
+    fn rho(&self) -> f64 {
+        self.mean + self.share * (self.depth - self.mean)
+    }
+}
+
+/// The mean depth, its derivative by the parameters, and the variance of what no match says of it.
+struct MeanDepth {
+    value: f64,
+    slope: Parameters,
+    variance: f64,
 }
 
 /// What a round sums up.
@@ -100,8 +134,6 @@ struct Sums {
     gradient: Parameters,
     usual: f64,
     near: f64,
-    /// Summed depths of near points.
-    near_depth: f64,
     square_spread: f64,
     /// Summed shares of the spread in what is left along the lines.
     share: f64,
@@ -157,29 +189,7 @@ fn precisions() -> Field {
 impl DepthField {
     /// A pose whose translation is in units of the mean depth, of points whose inverse depths spread by a share of their mean.
     pub(crate) fn start(q_21: UnitQuaternion<f64>, t_21: Vector3<f64>, spread: f64) -> Self {
-        Self {
-            q_21,
-            t_21,
-            field: Field::zeros(),
-            square_spread: spread * spread,
-            near: NEAR,
-            near_depth: 0.0,
-        }
-    }
-
-    /// The mean depth times the mean inverse depth, `1 +` the squared relative deviation: by how much a translation is longer in
-    /// units of the mean inverse depth than in those of the mean depth. Near points have depths of their own.
-    pub(crate) fn unit(&self) -> f64 {
-        let usual = 1.0 + self.square_spread + self.field.norm_squared();
-        (1.0 - self.near) * usual + self.near * self.near_depth
-    }
-
-    /// The variance of that unit over its square. `1 + v`, with `v` the squared relative deviation of the inverse depths, is exact for
-    /// logarithms that are normal. Depths that are uniform between two bounds have half of `v²` more or less, those of other
-    /// shapes about `v²`; the share of near points is known to a half.
-    pub(crate) fn unit_variance(&self) -> f64 {
-        let square = self.square_spread + self.field.norm_squared();
-        (square * square).powi(2) + (0.5 * self.near).powi(2)
+        Self { q_21, t_21, field: Field::zeros(), square_spread: spread * spread, near: NEAR }
     }
 
     /// By what share of their mean inverse depths differ from those of a plane, which are linear in the image.
@@ -228,25 +238,57 @@ impl DepthField {
         }
         let all = regularised(&sums, &precisions)?.inverse();
         let covariance: Matrix6<f64> = all.fixed_view::<6, 6>(0, 0).into_owned();
-        let by_depth = self.by_depth();
-        let covariance_by_depth = by_depth * all * by_depth.transpose();
+        let depth = self.mean_depth(terms, likelihood)?;
+        let by_depth = self.by_depth(&depth);
+        let mut covariance_by_depth = by_depth * all * by_depth.transpose();
+        let mut block = covariance_by_depth.fixed_view_mut::<3, 3>(3, 3);
+        block += self.t_21 * self.t_21.transpose() * (depth.variance / depth.value.powi(4));
         let nats = without_two(sums.nats) - self.surprise(&precisions);
         let is_finite =
             nats.is_finite() && covariance_by_depth.iter().chain(&covariance).all(|x| x.is_finite());
-        is_finite.then_some(Fit { at: self, nats, covariance, covariance_by_depth })
+        is_finite.then_some(Fit { at: self, nats, covariance, mean_depth: depth.value, covariance_by_depth })
     }
 
-    /// The derivative of the pose, with its translation in units of the mean depth, by all parameters: the coefficients of the field
-    /// change the unit.
-    fn by_depth(&self) -> SMatrix<f64, 6, PARAMETERS> {
-        let unit = self.unit();
-        let of_field = self.field * (2.0 * (1.0 - self.near));
+    /// The derivative of the pose, with its translation in units of the mean depth, by all parameters.
+    fn by_depth(&self, depth: &MeanDepth) -> SMatrix<f64, 6, PARAMETERS> {
         let mut derivative = SMatrix::<f64, 6, PARAMETERS>::identity();
-        derivative.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(1.0 / unit);
+        derivative.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(1.0 / depth.value);
+        let mut of_length = derivative.fixed_view_mut::<3, PARAMETERS>(3, 0);
+        of_length -= self.t_21 * depth.slope.transpose() / (depth.value * depth.value);
         derivative
-            .fixed_view_mut::<3, TERMS>(3, 6)
-            .copy_from(&(self.t_21 * of_field.transpose() * (-1.0 / (unit * unit))));
-        derivative
+    }
+
+    /// The mean depth of the points of the field and of near points. The mean of `1/ρ`, of a normal variable with the mean `m` and the
+    /// variance `v`, is `(1 + v/m²)/m` to second order; of depths whose logarithms are normal it is that exactly. Depths of
+    /// other shapes have about `(v/m²)²` more or less.
+    fn mean_depth(&self, terms: &[Field], likelihood: &Likelihood) -> Option<MeanDepth> {
+        let (mut sum, mut weights, mut slope) = (0.0, 0.0, Parameters::zeros());
+        let (mut unknown, mut of_each) = (0.0, 0.0);
+        for (index, (d, terms)) in likelihood.displacements(&self.q_21).iter().zip(terms).enumerate() {
+            let placed = self.place(d, terms, likelihood, index);
+            let Explained { usual, near, .. } = placed.explained;
+            let variance = self.square_spread * (1.0 - placed.share);
+            let rho = placed.rho().max(variance.sqrt()).max(1.0 / FARTHEST_POINT);
+            let square = if rho > placed.rho() { 2.0 } else { variance / (rho * rho) };
+            sum += usual * (1.0 + square.min(1.0)) / rho + near / placed.depth.max(1.0);
+            unknown += usual * square / rho;
+            of_each += usual * square / (rho * rho);
+            weights += usual + near;
+            let by_rho = -usual * (1.0 + 3.0 * square) / (rho * rho);
+            let [turn, unit] = [turn(d), d.slope].map(|v| v[0] * placed.u[0] + v[1] * placed.u[1]);
+            let by_match = by_rho * placed.share / placed.length;
+            let mut head = slope.fixed_rows_mut::<3>(0);
+            head -= turn * by_match;
+            let mut head = slope.fixed_rows_mut::<3>(3);
+            head -= unit * (by_match * placed.depth);
+            let mut tail = slope.fixed_rows_mut::<TERMS>(6);
+            tail += terms * (by_rho * (1.0 - placed.share));
+        }
+        (weights > 0.0).then(|| MeanDepth {
+            value: sum / weights,
+            slope: slope / weights,
+            variance: (UNKNOWN * (unknown / weights + self.near)).powi(2) + of_each / (weights * weights),
+        })
     }
 
     /// The logarithm of the likelihood and of what is known of the field before any match is seen, which the rounds increase.
@@ -289,7 +331,6 @@ impl DepthField {
             self.square_spread = (self.square_spread * ratio).max(LEAST_SPREAD);
             let near = (sums.near - FREE).max(0.0);
             self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
-            self.near_depth = if sums.near > 0.0 { sums.near_depth / sums.near } else { 0.0 };
         }
         self
     }
@@ -301,7 +342,6 @@ impl DepthField {
             gradient: Parameters::zeros(),
             usual: 0.0,
             near: 0.0,
-            near_depth: 0.0,
             square_spread: 0.0,
             share: 0.0,
             nats: Vec::with_capacity(terms.len()),
@@ -313,8 +353,8 @@ impl DepthField {
         sums
     }
 
-    /// Adds what a match says.
-    fn add(&self, sums: &mut Sums, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) {
+    /// Where a match is.
+    fn place(&self, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) -> Placed {
         let b = [0, 1].map(|k| d.slope[k].dot(&self.t_21));
         let length = b[0].hypot(b[1]).max(LEAST_LENGTH);
         // Without a translation any two directions do.
@@ -322,9 +362,17 @@ impl DepthField {
         let mean = 1.0 + terms.dot(&self.field);
         let across = d.residual[0] * u[1] - d.residual[1] * u[0];
         let along = -(d.residual[0] * u[0] + d.residual[1] * u[1]);
-        let (depth, away) = (along / length, mean * length - along);
+        let away = mean * length - along;
         let spread = self.square_spread * length * length;
+        let share = spread / (likelihood.variance() + spread);
         let explained = likelihood.explain(index, [across, away], along, spread, self.near, d.is_in_front);
+        Placed { length, u, mean, depth: along / length, across, away, share, explained }
+    }
+
+    /// Adds what a match says.
+    fn add(&self, sums: &mut Sums, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) {
+        let placed = self.place(d, terms, likelihood, index);
+        let Placed { length, u, mean, depth, across, away, share, .. } = placed;
         let Explained {
             usual,
             near,
@@ -332,23 +380,21 @@ impl DepthField {
             near_across: near_weight,
             along: along_weight,
             nats,
-        } = explained;
+        } = placed.explained;
         sums.nats.push(nats);
         sums.usual += usual;
         sums.near += near;
-        sums.near_depth += near / depth.max(1.0);
         if across_weight <= 0.0 {
             return;
         }
-        let variance = likelihood.variance();
-        let share = spread / (variance + spread);
-        let deviation = share * (depth - mean);
+        let deviation = placed.rho() - mean;
         sums.share += usual * share;
-        sums.square_spread += usual * (deviation * deviation + share * variance / (length * length));
-        let turn = d.slope.map(|slope| d.y.cross(&slope));
+        sums.square_spread +=
+            usual * (deviation * deviation + share * likelihood.variance() / (length * length));
+        let turn = turn(d);
         let side = [turn, d.slope].map(|v| v[0] * u[1] - v[1] * u[0]);
         // The lever of a near point is its own depth.
-        for (weight, rho) in [(across_weight - near_weight, mean + deviation), (near_weight, depth)] {
+        for (weight, rho) in [(across_weight - near_weight, placed.rho()), (near_weight, depth)] {
             let [by_turn, by_unit] = side;
             let row = Vector6::from_fn(|k, _| if k < 3 { by_turn[k] } else { by_unit[k - 3] * rho });
             sums.across.fixed_view_mut::<6, 6>(0, 0).ger(weight, &row, &row, 1.0);
@@ -362,6 +408,11 @@ impl DepthField {
         sums.along.ger(along_weight, &row, &row, 1.0);
         sums.gradient += row * (along_weight * away);
     }
+}
+
+/// By how much a match moves with a turn.
+fn turn(d: &Displacement) -> [Vector3<f64>; 2] {
+    d.slope.map(|slope| d.y.cross(&slope))
 }
 
 /// The normal equations with what is known of the field before any match is seen, factored.

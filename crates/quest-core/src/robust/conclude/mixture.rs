@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
 use crate::robust::conclude::depth_field::Fit;
+use crate::robust::conclude::length::Length;
 use crate::robust::conclude::rotation_alone::NOT_A_ROTATION;
 use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;
@@ -105,11 +106,9 @@ fn of_mode(fit: &Fit, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vec
     let block = fit.covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let along = fit.at.t_21.dot(&(block * fit.at.t_21)) / square;
     let direction = ((block.trace() - along) / square).clamp(0.0, 1.0);
-    let scale = 1.0 / fit.at.unit();
+    let scale = 1.0 / fit.mean_depth;
     let t_21 = fit.at.t_21 * (scale * (1.0 - 0.5 * direction));
-    let mut covariance = fit.covariance_by_depth * (1.0 + CURVED * direction);
-    let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
-    block += t_21 * t_21.transpose() * fit.at.unit_variance();
+    let covariance = fit.covariance_by_depth * (1.0 + CURVED * direction);
     Component { nats: fit.nats, mean: after(&fit.at.q_21, t_21), covariance }
 }
 
@@ -124,13 +123,18 @@ pub(crate) fn held(q_21: &UnitQuaternion<f64>, (pose, covariance): Distribution)
     (RelativePose::new(*q_21, pose.t_21 - step), covariance + by * by.transpose())
 }
 
-/// The same with a translation of this length, which is in units of the mean depth. The unit of a field only approximates it.
-pub(crate) fn of_length((pose, covariance): Distribution, length: f64) -> Distribution {
-    let scale = length / pose.t_21.norm();
+/// The same with a translation of this length, which is in units of the mean depth. The unit of a field only approximates it. The
+/// variance of the length for a given motion is added: that of which points the mean depth is over.
+pub(crate) fn of_length((pose, covariance): Distribution, length: &Length) -> Distribution {
+    let norm = pose.t_21.norm();
+    let scale = length.value / norm;
     if !(scale > 0.0 && scale.is_finite()) {
         return (pose, covariance);
     }
-    (RelativePose::new(pose.q_21, pose.t_21 * scale), in_unit(&covariance, scale))
+    let mut covariance = in_unit(&covariance, scale);
+    let mut block = covariance.fixed_view_mut::<3, 3>(3, 3);
+    block += pose.t_21 * pose.t_21.transpose() * (length.variance / (norm * norm));
+    (RelativePose::new(pose.q_21, pose.t_21 * scale), covariance)
 }
 
 /// The mean and the covariance of a mixture.

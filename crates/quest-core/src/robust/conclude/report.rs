@@ -174,7 +174,7 @@ fn of_small_motion(
         all = held(&small.q_21, all);
     }
     if let Some(length) = length_in_mean_depths(observations, &all.0, inliers, noise) {
-        all = of_length(all, length);
+        all = of_length(all, &length);
     }
     covariance::says_something(&all.1).then_some(all)
 }
@@ -185,10 +185,10 @@ fn length_in_mean_depths(
     pose: &RelativePose,
     inliers: &[u32],
     noise: &Noise,
-) -> Option<f64> {
+) -> Option<Length> {
     let direction = pose.t_21.try_normalize(f64::MIN_POSITIVE)?;
     let size = length(observations, &Motion { q_21: pose.q_21, direction }, inliers, noise);
-    size.is_clear.then_some(size.value)
+    size.is_clear.then_some(size)
 }
 
 /// The motion that the model makes of the pose, and another that explains the matches nearly as well.
