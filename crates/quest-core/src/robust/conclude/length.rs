@@ -41,6 +41,9 @@ const MOST: f64 = 0.9;
 const QUARTILE: usize = 75;
 const DEVIATIONS: f64 = 0.6745;
 
+/// The farther quarter of the points has at least this share less of the median inverse depth: what is left may be noise.
+const FARTHER: f64 = 0.8;
+
 /// Depths that differ by a factor of e in one deviation; noise that is larger than the median inverse depth seems to be more.
 const MOST_SQUARE: f64 = 1.0;
 
@@ -225,21 +228,23 @@ fn by_depths(all: &[BothDepths], badly: &[BothDepths], chance: &Chance) -> Lengt
         }
     }
     let (mut count, others) = (all.len() as f64, badly.len() as f64);
-    let (mut missed, mut of_badly) = (chance.missed, 0.0);
+    let (mut unseen, mut of_badly) = (0.0, 0.0);
     if let Some((z, variance)) = mean_of_many(badly) {
         sum += z * others;
         count += others;
         of_badly = variance * others * others;
     } else {
-        missed += others / count;
+        unseen = others;
     }
     let value = count / (sum + far);
     let square = |z: &f64| (z * value - 1.0).powi(2);
     let clear = || all.iter().filter(|depth| depth.is_clear());
     let of_noise: f64 = clear().map(|depth| depth.variance * depth.z().powi(4)).sum::<f64>() * value * value;
-    let of_missed = missed * clear().map(|depth| square(&depth.z())).sum::<f64>();
-    // What is common to those that are far is not known.
-    let of_far = ((UNKNOWN * far).powi(2) + of_badly) * value * value;
+    let squares = clear().map(|depth| square(&depth.z())).sum::<f64>();
+    let of_missed = chance.missed * squares;
+    // What is common to those that are far, or that are not seen well and may be in one place, is not known.
+    let of_unseen = (UNKNOWN * unseen).powi(2) * squares / all.len() as f64;
+    let of_far = ((UNKNOWN * far).powi(2) + of_badly) * value * value + of_unseen;
     let of_false = chance.each * chance.depths.iter().map(|(z, stays)| stays * square(z)).sum::<f64>();
     // d(n/Σz) = (n/Σz)² Σ z² dρ / n.
     let by_mean = value * value / count;
@@ -275,19 +280,22 @@ fn by_inverse_depths(all: &[BothDepths]) -> Length {
     }
 }
 
-/// The variance of the logarithms of the depths, by the points that are nearer than their median: those stand clear first. With normal
-/// logarithms the mean depth is `exp(τ²/2)` times the inverse of the median inverse depth.
+/// The variance of the logarithms of the depths, by the quartiles of the inverse depths: half by the points that are nearer than their
+/// median, which stand clear first, half by those that are farther. With normal logarithms the mean depth is `exp(τ²/2)` times the
+/// inverse of the median inverse depth.
 fn square_of_logarithms(all: &[BothDepths], median_rho: f64) -> f64 {
     if median_rho <= 0.0 {
         return 0.0;
     }
-    let mut beyond: Vec<f64> = all.iter().map(|depth| 0.5 * depth.sum() - median_rho).collect();
-    let at = QUARTILE * all.len() / 100;
-    let beyond = *beyond.select_nth_unstable_by(at, f64::total_cmp).1;
     let mut noises: Vec<f64> = all.iter().map(|depth| depth.variance).collect();
     let noise = median(&mut noises) * DEVIATIONS * DEVIATIONS;
-    let own = (beyond * beyond - noise).max(0.0).sqrt();
-    ((own / median_rho).ln_1p() / DEVIATIONS).powi(2).min(MOST_SQUARE)
+    let mut beyond: Vec<f64> = all.iter().map(|depth| 0.5 * depth.sum() - median_rho).collect();
+    let mut own = |percent: usize| {
+        let beyond = *beyond.select_nth_unstable_by(percent * all.len() / 100, f64::total_cmp).1;
+        (beyond * beyond - noise).max(0.0).sqrt() / median_rho
+    };
+    let [nearer, farther] = [own(QUARTILE).ln_1p(), -(-own(100 - QUARTILE).min(FARTHER)).ln_1p()];
+    (0.5 * (nearer * nearer + farther * farther) / (DEVIATIONS * DEVIATIONS)).min(MOST_SQUARE)
 }
 
 /// Whether the points whose depths stand clear of their noise are in front, by more than chance.
