@@ -3,6 +3,8 @@
 //! Each function checks the shapes, calls the core, and makes objects of its answer. An error of the core is a JavaScript
 //! `Error` with its text.
 
+#![expect(unreachable_pub, reason = "what goes to JavaScript is public, in whichever module it stands")]
+
 mod estimate;
 mod input;
 mod output;
