@@ -302,10 +302,23 @@ impl DepthField {
     }
 
     /// The step of Gauss and Newton.
+    ///
+    /// What is known of the field says nothing of the length of the translation. The matches tell their product, so that a flat
+    /// field, which is likelier beforehand, would make the translation longer. This is taken back: the derivative by the
+    /// translation is that with the product held.
     fn step(&self, sums: &Sums, precisions: &Field, factor: &Factor) -> Option<Parameters> {
         let mut gradient = sums.gradient;
         for (k, precision) in precisions.iter().enumerate() {
             gradient[6 + k] += precision * self.field[k];
+        }
+        let mut by_length = Parameters::zeros();
+        let square = self.t_21.norm_squared();
+        if square > 0.0 {
+            by_length.fixed_rows_mut::<3>(3).copy_from(&(self.t_21 / square));
+            let pull = 2.0 * self.surprise(precisions);
+            // A translation that is about its noise gets shorter by less, or it would turn around.
+            let variance = by_length.dot(&factor.solve(&by_length));
+            gradient += by_length * (pull / (1.0 + pull * variance));
         }
         let step = -factor.solve(&gradient);
         step.iter().all(|x| x.is_finite()).then_some(step)
