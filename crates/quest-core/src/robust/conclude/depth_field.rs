@@ -33,6 +33,11 @@ const PARAMETERS: usize = 6 + TERMS;
 /// at its sides as in the middle has 0.3.
 const RELIEF: f64 = 0.3;
 
+/// The deviation of all inverse depths over their mean is about the first, and known to a factor of e to the power of the second. Depths
+/// that are uniform from 4 to 9 have 0.24, logarithms that are uniform from 2 to 40 have 0.8.
+const USUAL_SPREAD: f64 = 0.32;
+const FACTOR: f64 = 0.7;
+
 /// The field is constant beyond this many deviations from the middle of the points, where polynomials would grow. Points that are
 /// uniform in the image end at 1.73.
 const FARTHEST: f64 = 1.8;
@@ -303,9 +308,9 @@ impl DepthField {
 
     /// The step of Gauss and Newton.
     ///
-    /// What is known of the field says nothing of the length of the translation. The matches tell their product, so that a flat
-    /// field, which is likelier beforehand, would make the translation longer. This is taken back: the derivative by the
-    /// translation is that with the product held.
+    /// The matches tell the product of the translation and the spread of the inverse depths better than either. What is known of the
+    /// field beforehand says nothing of the length of the translation, but a flat field, which is likelier, would make it longer.
+    /// This is taken back: the derivative by the length is that with the product held. What is known of the spread is put in its place.
     fn step(&self, sums: &Sums, precisions: &Field, factor: &Factor) -> Option<Parameters> {
         let mut gradient = sums.gradient;
         for (k, precision) in precisions.iter().enumerate() {
@@ -315,10 +320,12 @@ impl DepthField {
         let square = self.t_21.norm_squared();
         if square > 0.0 {
             by_length.fixed_rows_mut::<3>(3).copy_from(&(self.t_21 / square));
-            let pull = 2.0 * self.surprise(precisions);
-            // A translation that is about its noise gets shorter by less, or it would turn around.
+            let all = self.square_spread + self.field.norm_squared();
+            let pull =
+                2.0 * self.surprise(precisions) - 0.5 * (all / USUAL_SPREAD.powi(2)).ln() / FACTOR.powi(2);
+            // A translation that is about its noise changes by less, or it would turn around.
             let variance = by_length.dot(&factor.solve(&by_length));
-            gradient += by_length * (pull / (1.0 + pull * variance));
+            gradient += by_length * (pull / (1.0 + pull.abs() * variance));
         }
         let step = -factor.solve(&gradient);
         step.iter().all(|x| x.is_finite()).then_some(step)
