@@ -49,7 +49,7 @@ impl Cell {
 
 pub(crate) fn cells() -> Vec<Cell> {
     let mut cells = next_to_the_goal();
-    cells.extend(sticky());
+    cells.extend(arms());
     let tag = |name, size, count| Cell::new(name, Place::Tag { size }, count).with("", |c| c.coplanar = true);
     for (name, size, count) in [("a tag of 0.3 m", 0.3, 5), ("a board of 0.6 m", 0.6, 8)] {
         cells.push(tag(name, size, count));
@@ -94,8 +94,12 @@ fn next_to_the_goal() -> Vec<Cell> {
     cells
 }
 
-fn sticky() -> Vec<Cell> {
+/// An arm with few features, and with wrong matches.
+fn arms() -> Vec<Cell> {
     let mut cells = Vec::new();
+    for count in [6, 8] {
+        cells.push(Cell::new("arm", Place::Arm, count));
+    }
     for count in [12, 20, 40, 200] {
         for share in [0.05, 0.1, 0.2, 0.3] {
             for images in [20.0, f64::INFINITY] {

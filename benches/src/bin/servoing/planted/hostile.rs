@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 
 use quest_benches::parallel;
+use quest_core::RelativePose;
 use quest_core::servo::scenario::{self, Features};
 use quest_core::servo::{
     DepthFilter, Disturbances, Estimate, FreeCamera, FreeCameraLaw, HoldReason, Motion, Plant, PoseEstimator,
@@ -176,5 +177,9 @@ impl<E: PoseEstimator> PoseEstimator for Mangled<E> {
 
     fn restart(&mut self) {
         self.inner.restart();
+    }
+
+    fn begin(&self) -> Option<RelativePose> {
+        self.inner.begin()
     }
 }

@@ -7,6 +7,7 @@ pub(crate) mod safety;
 pub(crate) mod state;
 mod watchdog;
 
+use crate::RelativePose;
 use crate::servo::estimators::estimate::{Estimate, HoldReason, PoseEstimator, Support};
 use crate::servo::laws::law::ControlLaw;
 use crate::servo::twist::Twist;
@@ -151,6 +152,11 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
                 || within(variance(3), self.safety.translation_uncertainty))
     }
 
+    /// What the law lets fall.
+    fn potential(&self, pose: &RelativePose) -> Option<f64> {
+        self.law.potential(&self.rig.axes.of_pose(pose))
+    }
+
     /// The command for an image with a pose.
     fn follow(&mut self, features: &[Option<[f64; 2]>], estimate: &Estimate, seconds: f64) -> Step {
         let pose = self.rig.mount.pose_for_law(&estimate.pose, self.rig.unit);
@@ -161,10 +167,11 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
             Support::Full => (State::Tracking, self.law.command(&pose)),
         };
         let motion = self.memory.motion(seconds, self.rig.unit);
-        let potential =
-            self.law.potential(&self.rig.axes.of_pose(&pose)).filter(|_| state != State::RotationOnly);
+        let potential = self.potential(&pose).filter(|_| state != State::RotationOnly);
+        let begin = self.estimator.begin().map(|begin| self.rig.mount.pose_for_law(&begin, self.rig.unit));
+        let scale = begin.and_then(|begin| self.potential(&begin)).unwrap_or(1.0);
         let variance = estimate.covariance.map_or(0.0, |c| c.trace());
-        if self.safety.watchdog && self.memory.watchdog.is_diverging(potential, variance, &motion) {
+        if self.safety.watchdog && self.memory.watchdog.is_diverging(potential, scale, variance, &motion) {
             self.estimator.restart();
             return self.hold(features, HoldReason::Diverging, seconds);
         }

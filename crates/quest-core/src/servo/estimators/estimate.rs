@@ -117,6 +117,11 @@ pub trait PoseEstimator {
         &[]
     }
 
+    /// Where the camera was when it began, as it is known now; `None` for an estimator that learns nothing on the way.
+    fn begin(&self) -> Option<RelativePose> {
+        None
+    }
+
     /// How many hypotheses are alive.
     fn hypotheses(&self) -> usize {
         0

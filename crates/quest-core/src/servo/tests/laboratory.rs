@@ -70,6 +70,30 @@ fn wrong_matches_that_stay_do_not_keep_it_from_its_goal() {
     assert!(arrived + 1 >= starts, "{arrived} of {starts}");
 }
 
+/// The first images of eight features say two thirds of the way. The rest is learnt while the camera comes nearer, which is no reason to stop.
+#[test]
+fn a_way_that_turns_out_longer_does_not_stop_the_loop() {
+    let (mut arrived, starts) = (0, 30_u64);
+    for index in 0..starts {
+        let rng = &mut scenario::generator(0x1e47, index);
+        let law = FreeCameraLaw { rate: 0.5, unit: UNIT };
+        let (world, mut camera) = loop {
+            let drawn = scenario::random(Features::General, 8, &noisy(None), rng, scenario::random_camera);
+            if drawn.0.stays_in_view(drawn.1, law, &LAB, UNIT, 300) {
+                break drawn;
+            }
+        };
+        let servo = loop_for(&world, rng);
+        let records = records(&world, &mut camera, servo, 300, rng);
+        let diverging = |r: &Record| r.step.state == State::Holding(HoldReason::Diverging);
+        let found = records.iter().filter(|r| diverging(r)).count();
+        assert!(found < 2, "start {index}: {found} images");
+        let (metres, degrees) = off(&camera.pose());
+        arrived += u64::from(metres < 0.03 && degrees < 1.5);
+    }
+    assert!(arrived + 1 >= starts, "{arrived} of {starts}");
+}
+
 #[test]
 fn hostile_images_make_no_unsafe_command() {
     let counts = [6, 8, 12, 20].into_iter().cycle();

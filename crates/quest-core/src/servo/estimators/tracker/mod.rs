@@ -27,6 +27,7 @@ mod start;
 
 use nalgebra::Vector3;
 
+use crate::RelativePose;
 use crate::servo::FilterOptions;
 use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion, PoseEstimator};
 use crate::servo::estimators::source::PoseSource;
@@ -431,6 +432,10 @@ impl<S: PoseSource> PoseEstimator for Tracker<S> {
 
     fn inliers(&self) -> &[bool] {
         &self.inliers
+    }
+
+    fn begin(&self) -> Option<RelativePose> {
+        self.hypotheses[..self.count].first()?.map.keys.first().copied()
     }
 
     fn hypotheses(&self) -> usize {
