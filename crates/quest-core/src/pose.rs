@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::Correspondence;
-use crate::algebra::vectors::two::Two;
+use crate::algebra::vectors::lane::{F, Float, Lanes};
 
 /// Two rays closer than this (the sine of their angle) are parallel to rounding: their depths are noise.
 pub(crate) const PARALLEL: f64 = 8.0 * f64::EPSILON;
@@ -137,10 +137,13 @@ pub(crate) fn sampson_square(e: f64, tb: f64, tc: f64) -> f64 {
     (e * e / gradient2.max(f64::MIN_POSITIVE)).min(RIGHT_ANGLE * RIGHT_ANGLE)
 }
 
-/// [`sampson_square`] of two matches at once.
-#[inline]
-pub(crate) fn sampson_squares(e: Two, tb: Two, tc: Two) -> Two {
-    let gradient2 = Two::splat(2.0) - tb * tb - tc * tc - Two::splat(2.0) * e * e;
-    let square = e * e / gradient2.fast_max(Two::splat(f64::MIN_POSITIVE));
-    square.fast_min(Two::splat(RIGHT_ANGLE * RIGHT_ANGLE))
+/// [`sampson_square`] of many at once.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
+pub(crate) fn sampson_squares<L: Lanes<f64>>(lanes: L, e: F<L>, tb: F<L>, tc: F<L>) -> F<L> {
+    let [least, most] = [f64::MIN_POSITIVE, RIGHT_ANGLE * RIGHT_ANGLE].map(|x| lanes.splat(x));
+    let two = lanes.splat(2.0);
+    let gradient2 = (two * e).neg_mul_add(e, tc.neg_mul_add(tc, tb.neg_mul_add(tb, two)));
+    let square = e * e / gradient2.select(least.less(gradient2), least);
+    square.select(square.less(most), most)
 }

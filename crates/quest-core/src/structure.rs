@@ -9,15 +9,19 @@
 //! the least-squares depths where the two rays do not meet, and at a solution the null vector of the matrix `B` of
 //! (58), (59) up to its scale. The common scale is chosen so that the mean absolute depth over both views is 1:
 //! `|t|` is then the parallax (63), and goes to zero with it.
+#![expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
 
 use std::array::from_fn;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::symmetric::{smallest_eigenvector_3, smallest_eigenvectors_3};
+use crate::algebra::vectors::abreast::{Work, abreast};
+use crate::algebra::vectors::columns::{Column, MotionColumns};
+use crate::algebra::vectors::geometry;
+use crate::algebra::vectors::lane::{F, Float, Lanes, MAX_F64_LANES, Mask};
 use crate::algebra::vectors::two::{
-    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled, side_by_side,
-    unit_quaternions,
+    Two, TwoLanes, TwoVectors, both, cross, dot, quaternions, rotation, side_by_side,
 };
 use crate::pose::{PARALLEL, sampson_squares};
 use crate::{Correspondence, RelativePose};
@@ -73,7 +77,7 @@ pub fn with_depths(
 ) -> Completed {
     let (q, t) = (quaternions(&q_21, &q_21), both(direction));
     let r_21 = rotation(&q);
-    let mut tally = Tally::default();
+    let mut tally = Tally::new(TwoLanes);
     for pair in matches.chunks(2) {
         let second = pair.get(1);
         let a = side_by_side(pair[0].bearing1(), second.map(Correspondence::bearing1));
@@ -82,45 +86,85 @@ pub fn with_depths(
             Two::new([pair[0].length1(), second.map_or(1.0, Correspondence::length1)]),
             Two::new([pair[0].length2(), second.map_or(1.0, Correspondence::length2)]),
         ];
-        tally.add(&Rays::new(&a, &b, &r_21, &t), &lengths);
+        tally.add(TwoLanes, &Rays::new(TwoLanes, &a, &b, &r_21, &t), &lengths);
     }
-    let [completed, _] = tally.map(|sum| Two::splat(sum.reduce_add())).completed(&q, &t, matches);
-    completed
+    let mut out = CompletedColumns::new();
+    tally.map(|sum| Two::splat(sum.reduce_add())).complete(TwoLanes, &q, &t, matches.len(), 0, &mut out);
+    out.get(0, matches)
 }
 
-/// The same for two rotations and directions side by side.
-pub(crate) fn two_with_depths(
-    q_21: &TwoQuaternions,
-    direction: &TwoVectors,
+/// The same for the first `count` of some rotations and directions, and with a second place in `out` for their twisted partners:
+/// the other rotations of the same essential matrices.
+pub(crate) fn many_with_depths(
+    motions: &MotionColumns,
+    count: usize,
     matches: &[Correspondence],
-) -> [Completed; 2] {
-    let r_21 = rotation(q_21);
-    let mut tally = Tally::default();
-    for m in matches {
-        let rays = Rays::new(&both(m.bearing1()), &both(m.bearing2()), &r_21, direction);
-        tally.add(&rays, &[m.length1(), m.length2()].map(Two::splat));
-    }
-    tally.completed(q_21, direction, matches)
+    out: &mut [CompletedColumns],
+) {
+    abreast(ManyWithDepths { motions, count, matches, out });
 }
 
-/// The same for two motions and their twisted partners: the two rotations of two essential matrices.
-pub(crate) fn two_pairs_with_depths(
-    q_21: &TwoQuaternions,
-    direction: &TwoVectors,
-    matches: &[Correspondence],
-) -> [[Completed; 2]; 2] {
-    let r_21 = rotation(q_21);
-    let (mut tally, mut twisted) = (Tally::default(), Tally::default());
-    for m in matches {
-        let b = both(m.bearing2());
-        let rays = Rays::new(&both(m.bearing1()), &b, &r_21, direction);
-        let lengths = [m.length1(), m.length2()].map(Two::splat);
-        tally.add(&rays, &lengths);
-        twisted.add(&rays.twisted(&b, direction), &lengths);
+struct ManyWithDepths<'a> {
+    motions: &'a MotionColumns,
+    count: usize,
+    matches: &'a [Correspondence],
+    out: &'a mut [CompletedColumns],
+}
+
+impl Work for ManyWithDepths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<f64>>(self, lanes: L) {
+        for first in (0..self.count).step_by(L::COUNT) {
+            let (q_21, t) = self.motions.load(lanes, first);
+            let r_21 = geometry::rotation(lanes, &q_21);
+            let (mut tally, mut twisted) = (Tally::new(lanes), Tally::new(lanes));
+            for m in self.matches {
+                let b = geometry::splat(lanes, m.bearing2());
+                let rays = Rays::new(lanes, &geometry::splat(lanes, m.bearing1()), &b, &r_21, &t);
+                let lengths = [lanes.splat(m.length1()), lanes.splat(m.length2())];
+                tally.add(lanes, &rays, &lengths);
+                if self.out.len() > 1 {
+                    twisted.add(lanes, &rays.twisted(&b, &t), &lengths);
+                }
+            }
+            let count = self.matches.len();
+            tally.complete(lanes, &q_21, &t, count, first, &mut self.out[0]);
+            if let Some(out) = self.out.get_mut(1) {
+                let twin = geometry::composed::<L>(&[lanes.splat(0.0), t[0], t[1], t[2]], &q_21);
+                twisted.complete(lanes, &twin, &t, count, first, out);
+            }
+        }
     }
-    let [x, y, z] = *direction;
-    let twin = product(&[Two::ZERO, x, y, z], q_21);
-    [tally.completed(q_21, direction, matches), twisted.completed(&twin, direction, matches)]
+}
+
+/// Motions that are [`Completed`].
+#[derive(Clone, Copy)]
+pub(crate) struct CompletedColumns {
+    motions: MotionColumns,
+    in_front: Column,
+    residual: Column,
+    /// The sum of the depths; zero where no match has one.
+    absolute: Column,
+}
+
+impl CompletedColumns {
+    pub(crate) const fn new() -> Self {
+        let none = [0.0; MAX_F64_LANES];
+        Self { motions: MotionColumns::new(), in_front: none, residual: none, absolute: none }
+    }
+
+    /// The motion in place `k`.
+    #[inline]
+    pub(crate) fn get(&self, k: usize, matches: &[Correspondence]) -> Completed {
+        let ((q_21, t_21), in_front) = (self.motions.get(k), whole(self.in_front[k]));
+        if self.absolute[k] == 0.0 {
+            let pose = RelativePose::new(q_21, Vector3::zeros());
+            return Completed { pose, in_front, residual: pose.residual(matches) };
+        }
+        Completed { pose: RelativePose::new(q_21, t_21), in_front, residual: self.residual[k] }
+    }
 }
 
 /// The same pose, its points counted and the sign of its translation chosen with the noise in mind: a match whose rays are closer to
@@ -149,77 +193,95 @@ pub(crate) fn with_noise(found: &Completed, matches: &[Correspondence]) -> Compl
 /// A depth stands clear of its noise where the angle between the rays is more than this many times the noise of both.
 const CLEAR: f64 = 4.0;
 
-/// What is needed of two pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: two matches, or one match after
-/// two rotations.
-struct Rays {
+/// What is needed of pairs of rays, `b` of view 2 and `c` of view 1 after the rotation: some matches, or one match after some
+/// rotations.
+struct Rays<L: Lanes<f64>> {
     /// `b × c`.
-    normal: TwoVectors,
+    normal: geometry::Vector3<L>,
     /// `b · c`.
-    cosine: Two,
+    cosine: F<L>,
     /// `t · b` and `t · c`.
-    along: [Two; 2],
+    along: [F<L>; 2],
     /// The squared Sampson errors.
-    squares: Two,
+    squares: F<L>,
 }
 
-impl Rays {
-    #[inline]
-    fn new(a: &TwoVectors, b: &TwoVectors, r_21: &[TwoVectors; 3], t: &TwoVectors) -> Self {
-        let c = from_fn(|i| dot(&r_21[i], a));
-        let (normal, along) = (cross(b, &c), [dot(t, b), dot(t, &c)]);
-        let squares = sampson_squares(dot(t, &normal), along[0], along[1]);
-        Self { normal, cosine: dot(b, &c), along, squares }
+impl<L: Lanes<f64>> Rays<L> {
+    #[inline(always)]
+    fn new(
+        lanes: L,
+        a: &geometry::Vector3<L>,
+        b: &geometry::Vector3<L>,
+        r_21: &geometry::Matrix3<L>,
+        t: &geometry::Vector3<L>,
+    ) -> Self {
+        let c = geometry::product::<L>(r_21, a);
+        let normal = geometry::cross::<L>(b, &c);
+        let along = [geometry::dot::<L, 3>(t, b), geometry::dot::<L, 3>(t, &c)];
+        let squares = sampson_squares(lanes, geometry::dot::<L, 3>(t, &normal), along[0], along[1]);
+        Self { normal, cosine: geometry::dot::<L, 3>(b, &c), along, squares }
     }
 
     /// Of `c' = 2 (t · c) t − c`, as after the twisted rotation. The angles to `t` stay, and the constraint but for its sign.
-    #[inline]
-    fn twisted(&self, b: &TwoVectors, t: &TwoVectors) -> Self {
+    #[inline(always)]
+    fn twisted(&self, b: &geometry::Vector3<L>, t: &geometry::Vector3<L>) -> Self {
         let [tb, tc] = self.along;
-        let (twice, moment) = (tc + tc, cross(b, t));
-        let normal = from_fn(|k| twice * moment[k] - self.normal[k]);
-        Self { normal, cosine: twice * tb - self.cosine, ..*self }
+        let (twice, moment) = (tc + tc, geometry::cross::<L>(b, t));
+        let mut normal = moment;
+        for k in 0..3 {
+            normal[k] = twice.mul_add(moment[k], -self.normal[k]);
+        }
+        Self { normal, cosine: twice.mul_add(tb, -self.cosine), ..*self }
     }
 }
 
 /// What the matches say of the sign and the length of a translation: sums over those on either side.
-#[derive(Clone, Copy, Default)]
-struct Tally {
-    front: Two,
-    behind: Two,
+#[derive(Clone, Copy)]
+struct Tally<V> {
+    front: V,
+    behind: V,
     /// Matches whose rays are not parallel.
-    with_depth: Two,
+    with_depth: V,
     /// Matches whose rays are parallel and point the same way.
-    at_infinity: Two,
+    at_infinity: V,
     /// The sum of the depths, each before its division, and that of their absolute values.
-    signed: Two,
-    absolute: Two,
+    signed: V,
+    absolute: V,
     /// The sum of the squared Sampson errors.
-    squares: Two,
+    squares: V,
 }
 
-impl Tally {
-    #[inline]
-    fn add(&mut self, rays: &Rays, [length1, length2]: &[Two; 2]) {
-        let (cosine, [tb, tc]) = (rays.cosine, rays.along);
-        let (zero, one) = (Two::ZERO, Two::splat(1.0));
-        let mut square = dot(&rays.normal, &rays.normal);
-        // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
-        let (mut area1, mut area2) = (cosine * tb - tc, tb - cosine * tc);
-        let is_parallel = square.simd_le(Two::splat(PARALLEL * PARALLEL));
-        if is_parallel.any() {
-            (area1, area2) = (!is_parallel & area1, !is_parallel & area2);
-            square = is_parallel.select(one, square);
-            self.at_infinity += is_parallel & cosine.simd_gt(zero) & one;
-        }
-        self.with_depth += !is_parallel & one;
-        self.front += area1.simd_gt(zero) & area2.simd_gt(zero) & one;
-        self.behind += area1.simd_lt(zero) & area2.simd_lt(zero) & one;
-        self.signed += area1 + area2;
-        self.absolute += (area1.abs() * *length2 + area2.abs() * *length1) / (square * (*length1 * *length2));
-        self.squares += rays.squares;
+impl<V: Float<f64>> Tally<V> {
+    #[inline(always)]
+    fn new<L: Lanes<f64, Float = V>>(lanes: L) -> Self {
+        let zero = lanes.splat(0.0);
+        let (front, behind, with_depth, at_infinity) = (zero, zero, zero, zero);
+        Self { front, behind, with_depth, at_infinity, signed: zero, absolute: zero, squares: zero }
     }
 
-    fn map(self, f: impl Fn(Two) -> Two) -> Self {
+    #[inline(always)]
+    fn add<L: Lanes<f64, Float = V>>(&mut self, lanes: L, rays: &Rays<L>, [length1, length2]: &[V; 2]) {
+        let (cosine, [tb, tc]) = (rays.cosine, rays.along);
+        let (zero, one) = (lanes.splat(0.0), lanes.splat(1.0));
+        let mut square = geometry::dot::<L, 3>(&rays.normal, &rays.normal);
+        // −(b × t) · (b × c) and −(c × t) · (b × c): the ranges before their division by |n|².
+        let (mut area1, mut area2) = (cosine.mul_add(tb, -tc), cosine.neg_mul_add(tc, tb));
+        let is_parallel = square.less(lanes.splat(PARALLEL * PARALLEL));
+        if is_parallel.any() {
+            (area1, area2) = (zero.select(is_parallel, area1), zero.select(is_parallel, area2));
+            square = one.select(is_parallel, square);
+            self.at_infinity = self.at_infinity + one.select(is_parallel.and(zero.less(cosine)), zero);
+        }
+        self.with_depth = self.with_depth + zero.select(is_parallel, one);
+        self.front = self.front + one.select(zero.less(area1).and(zero.less(area2)), zero);
+        self.behind = self.behind + one.select(area1.less(zero).and(area2.less(zero)), zero);
+        self.signed = self.signed + (area1 + area2);
+        let depths = area1.abs().mul_add(*length2, area2.abs() * *length1);
+        self.absolute = self.absolute + depths / (square * (*length1 * *length2));
+        self.squares = self.squares + rays.squares;
+    }
+
+    fn map(self, f: impl Fn(V) -> V) -> Self {
         Self {
             front: f(self.front),
             behind: f(self.behind),
@@ -231,28 +293,27 @@ impl Tally {
         }
     }
 
-    #[inline]
-    fn completed(
+    /// Writes the motions that are completed from place `first` on.
+    #[inline(always)]
+    fn complete<L: Lanes<f64, Float = V>>(
         &self,
-        q_21: &TwoQuaternions,
-        direction: &TwoVectors,
-        matches: &[Correspondence],
-    ) -> [Completed; 2] {
-        let is_tie = self.behind.simd_eq(self.front) & self.signed.simd_lt(Two::ZERO);
-        let flip = self.behind.simd_gt(self.front) | is_tie;
-        let length = self.with_depth * 2.0 / self.absolute;
-        let t_21 = scaled(direction, flip.select(-length, length)).map(Two::to_array);
-        let in_front = (self.at_infinity + flip.select(self.behind, self.front)).to_array();
-        let residual = (self.squares / matches.len() as f64).sqrt().to_array();
-        let (q_21, absolute) = (unit_quaternions(q_21), self.absolute.to_array());
-        from_fn(|k| {
-            if absolute[k] == 0.0 {
-                let pose = RelativePose::new(q_21[k], Vector3::zeros());
-                return Completed { pose, in_front: whole(in_front[k]), residual: pose.residual(matches) };
-            }
-            let pose = RelativePose::new(q_21[k], Vector3::from(t_21.map(|t| t[k])));
-            Completed { pose, in_front: whole(in_front[k]), residual: residual[k] }
-        })
+        lanes: L,
+        q_21: &geometry::Quaternion<L>,
+        direction: &geometry::Vector3<L>,
+        matches: usize,
+        first: usize,
+        out: &mut CompletedColumns,
+    ) {
+        // More are behind; or as many, and the sum of the depths is negative.
+        let balance = self.front - self.behind;
+        let lean = self.signed.select(balance.abs().less(lanes.splat(0.5)), balance);
+        let flip = lean.less(lanes.splat(0.0));
+        let length = self.with_depth * lanes.splat(2.0) / self.absolute;
+        let t_21 = geometry::scaled::<L, 3>(*direction, (-length).select(flip, length));
+        out.motions.store::<L>(first, q_21, &t_21);
+        (self.at_infinity + self.behind.select(flip, self.front)).store(&mut out.in_front[first..]);
+        (self.squares / lanes.splat(matches as f64)).sqrt().store(&mut out.residual[first..]);
+        self.absolute.store(&mut out.absolute[first..]);
     }
 }
 

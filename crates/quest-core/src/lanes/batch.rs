@@ -1,18 +1,18 @@
 //! Samples in, essential matrices out.
 
 use super::essentials::Essentials;
+use crate::algebra::vectors::geometry::{Vector3, cross, dot, longest, product, scaled};
 use crate::algebra::vectors::instructions::{Instructions, Task, Token};
 use crate::algebra::vectors::lane::{F, Float, Lanes, M, MAX_F64_LANES as MAX_LANES, Mask, WordLanes};
 use crate::algebra::vectors::twice::{Twice, TwiceLanes, twice};
 use crate::lanes::stages::cubics::{self, Cubics};
 use crate::lanes::stages::elimination::reduce;
 use crate::lanes::stages::frame::{Frame, frame};
-use crate::lanes::stages::geometry::{Vector3, cross, dot, longest, product, scaled};
 use crate::lanes::stages::isolation::{self, Cells, Grid, MAX_ROOTS, Tables};
-use crate::lanes::stages::motion::Motion;
 use crate::lanes::stages::null_space::{Basis, null_space};
 use crate::lanes::stages::resultant::Resultant;
 use crate::lanes::stages::roots::{self, Root};
+use crate::solver::shared::newton_lanes::Motion;
 use crate::solver::{Kinds, PoseSolver, Quest};
 use crate::{Candidates, Correspondence};
 
@@ -191,10 +191,11 @@ impl Batch<'_> {
                 .map_err(|error| SampleError { sample: error.sample + group * L::COUNT, ..error })?;
             solve_group(lanes, tables, self.tolerance, self.rest, &bearings, &mut space, &mut found);
             for (lane, sample) in samples.iter().enumerate() {
-                if self.rest == Rest::Solved && !found.is_complete[lane] {
+                let is_complete = found.complete[lane] != 0;
+                if self.rest == Rest::Solved && !is_complete {
                     self.out.push_sample(true, alone(&sample.map(|i| self.matches[i as usize])));
                 } else {
-                    self.out.push_sample(found.is_complete[lane], found.of(lane));
+                    self.out.push_sample(is_complete, found.of(lane));
                 }
             }
         }
@@ -226,32 +227,31 @@ fn gather<L: Lanes<f64>>(
 
 /// What a group of samples has for solutions.
 struct Found {
-    pairs: [Pair; MAX_ROOTS / 2],
-    /// How many of the pairs are in use.
-    most: usize,
-    is_complete: [bool; MAX_LANES],
-}
-
-/// At most two solutions of each sample: the second of all stand behind the first of all.
-#[derive(Clone, Copy)]
-struct Pair {
-    matrix: [[f64; 2 * MAX_LANES]; 9],
-    is_kept: [bool; 2 * MAX_LANES],
+    /// The matrices of two roots of each sample: those of the second of all stand behind those of the first of all.
+    pairs: [[[f64; 2 * MAX_LANES]; 9]; MAX_ROOTS / 2],
+    /// A bit for each root of a sample whose matrix counts.
+    kept: [u64; MAX_LANES],
+    /// Not zero for a sample that is complete.
+    complete: [u64; MAX_LANES],
 }
 
 impl Found {
     fn new() -> Self {
-        let pair = Pair { matrix: [[0.0; 2 * MAX_LANES]; 9], is_kept: [false; 2 * MAX_LANES] };
-        Self { pairs: [pair; MAX_ROOTS / 2], most: 0, is_complete: [false; MAX_LANES] }
+        let pair = [[0.0; 2 * MAX_LANES]; 9];
+        Self { pairs: [pair; MAX_ROOTS / 2], kept: [0; MAX_LANES], complete: [0; MAX_LANES] }
     }
 
     /// The matrices of a sample.
     #[inline(always)]
     fn of(&self, lane: usize) -> impl Iterator<Item = [f64; 9]> {
-        let places =
-            self.pairs[..self.most].iter().flat_map(move |pair| [(pair, lane), (pair, MAX_LANES + lane)]);
-        let kept = places.filter(|(pair, place)| pair.is_kept[*place]);
-        kept.map(|(pair, place)| std::array::from_fn(|j| pair.matrix[j][place]))
+        let mut kept = self.kept[lane];
+        std::iter::from_fn(move || {
+            let slot = kept.trailing_zeros() as usize;
+            let pair = self.pairs.get(slot / 2)?;
+            kept &= kept - 1;
+            let place = lane + slot % 2 * MAX_LANES;
+            Some(std::array::from_fn(|j| pair[j][place]))
+        })
     }
 }
 
@@ -312,14 +312,15 @@ fn solve_group<L: WordLanes>(
 
     let essentials = essential_basis(&frame, &basis);
     let back = Back { lanes, tolerance, a: &a, b: &b, resultant: &resultant, essentials: &essentials };
-    found.most = cells.count[..L::COUNT].iter().copied().max().unwrap_or(0).div_ceil(2);
-    for (k, pair) in found.pairs[..found.most].iter_mut().enumerate() {
+    let most = cells.count[..L::COUNT].iter().copied().max().unwrap_or(0).div_ceil(2);
+    let mut kept = lanes.no_bits();
+    for (k, pair) in found.pairs[..most].iter_mut().enumerate() {
         let slot = Twice(lanes.splat((2 * k) as f64), lanes.splat((2 * k + 1) as f64));
         let is_there = slot.less(Twice(count, count));
         let root = roots::refine(lanes, &polynomial, &mirrored, cells, 2 * k, is_there);
         let (matrix, is_good) = back.essential(&root, is_there);
         for j in 0..9 {
-            matrix[j].store(&mut pair.matrix[j]);
+            matrix[j].store(&mut pair[j]);
         }
         let twice = TwiceLanes(lanes);
         let (zero, one) = (twice.splat(0.0), twice.splat(1.0));
@@ -327,15 +328,13 @@ fn solve_group<L: WordLanes>(
         if rest == Rest::Unasked {
             is_kept = is_kept.and(back.is_oriented(&matrix));
         }
-        let mut kept = [0.0; 2 * MAX_LANES];
-        one.select(is_kept, zero).store(&mut kept);
-        pair.is_kept = kept.map(|x| x > 0.5);
+        kept = lanes.with_bit(kept, is_kept.0, 1 << (2 * k));
+        kept = lanes.with_bit(kept, is_kept.1, 2 << (2 * k));
         let lost = zero.select(is_good, one).select(is_there, zero);
         is_complete = is_complete.and((lost.0 + lost.1).less(lanes.splat(0.5)));
     }
-    let mut complete = [0.0; MAX_LANES];
-    lanes.splat(1.0).select(is_complete, lanes.splat(0.0)).store(&mut complete);
-    found.is_complete = complete.map(|x| x > 0.5);
+    lanes.store_words(kept, &mut found.kept);
+    lanes.store_words(lanes.with_bit(lanes.no_bits(), is_complete, 1), &mut found.complete);
 }
 
 /// From roots to essential matrices.
@@ -411,7 +410,9 @@ impl<L: Lanes<f64>> Back<'_, L> {
         let mut last = lanes.splat(1.0).select(is_there, lanes.splat(0.0));
         let mut longest = lanes.splat(0.0);
         for _ in 0..MAX_NEWTON_STEPS {
-            let (next, length) = motion.step(lanes, |i| [twice(&self.a[i]), twice(&self.b[i])]);
+            let step =
+                motion.step(lanes, |i| [twice(&self.a[i]), twice(&self.b[i])], |_, constraint| constraint);
+            let (next, length) = (step.next, step.turn + step.moved);
             // A lane that has arrived stays where it is, whatever its neighbours do.
             let active = short.less(last);
             motion = next.select(active, motion);

@@ -40,7 +40,7 @@
 //! | `resultant.rs` | three equations linear in `x` and `y`, the polynomial of degree ten, the point of a root |
 //! | `isolation.rs` | a cell for each of its real roots |
 //! | `roots.rs` | the roots, and a second count of them by Sturm's theorem |
-//! | `motion.rs` | rotation and translation, Newton's iteration |
+//! | `solver/shared/newton_lanes.rs` | rotation and translation, Newton's iteration |
 //! | `batch.rs` | all of it, for groups of samples |
 //!
 //! What a scalar solver decides by branches is decided here by masks, or not at all: no pivoting, no second attempt. A lane

@@ -1,7 +1,10 @@
 //! Intervals with one root each: found by trisection with the counts of a Sturm chain, narrowed by a safeguarded Laguerre iteration.
+#![expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
 
 use super::MAX_STEPS;
 use super::sturm::{Chain, End};
+use crate::algebra::vectors::abreast::{Work, abreast};
+use crate::algebra::vectors::lane::{F, Float, Lanes, MAX_F64_LANES, Mask};
 use crate::algebra::vectors::two::Two;
 
 /// The real roots that were found.
@@ -85,19 +88,39 @@ impl<const N: usize> Brackets<N> {
     }
 
     /// The roots: Laguerre's iteration, bisection where it would leave the bracket.
-    ///
-    /// A step of each two in turn: the steps of one root wait for each other, those of different roots do not.
     pub(super) fn refined(&self, p: &[f64; N]) -> RealRoots<N> {
-        let mut pairs = [TwoBrackets::default(); N];
-        let pairs = &mut pairs[..self.len.div_ceil(2)];
-        for (pair, brackets) in pairs.iter_mut().zip(self.items[..self.len].chunks(2)) {
-            *pair = TwoBrackets::new(&brackets[0], &brackets[brackets.len() - 1]);
+        abreast(Refining { brackets: self, p })
+    }
+}
+
+/// Groups of roots of a polynomial, two or more in each.
+const MAX_GROUPS: usize = 6;
+
+/// The refinement of all roots, as many abreast as there are lanes.
+struct Refining<'a, const N: usize> {
+    brackets: &'a Brackets<N>,
+    p: &'a [f64; N],
+}
+
+impl<const N: usize> Work for Refining<'_, N> {
+    type Output = RealRoots<N>;
+
+    /// A step of each group in turn: the steps of one root wait for each other, those of different roots do not.
+    #[inline(always)]
+    fn run<L: Lanes<f64>>(self, lanes: L) -> RealRoots<N> {
+        const { assert!(N <= 2 * MAX_GROUPS) }
+        let Brackets { items, len, certain } = self.brackets;
+        let groups = len.div_ceil(L::COUNT);
+        let mut all = [ManyBrackets::new(lanes, &[]); MAX_GROUPS];
+        for k in 0..groups {
+            all[k] = ManyBrackets::new(lanes, &items[k * L::COUNT..*len]);
         }
         for _ in 0..MAX_STEPS {
             let mut is_done = true;
-            for pair in &mut *pairs {
-                if !pair.is_found.all() {
-                    is_done &= pair.step(p);
+            for k in 0..groups {
+                if all[k].active.any() {
+                    all[k].step(lanes, self.p);
+                    is_done &= !all[k].active.any();
                 }
             }
             if is_done {
@@ -105,57 +128,61 @@ impl<const N: usize> Brackets<N> {
             }
         }
         let mut values = [0.0; N];
-        for (values, pair) in values.chunks_mut(2).zip(pairs) {
-            let roots = pair.x.to_array();
-            values.copy_from_slice(&roots[..values.len()]);
+        for k in 0..groups {
+            let mut roots = [0.0; MAX_F64_LANES];
+            all[k].x.store(&mut roots);
+            for (value, root) in values[k * L::COUNT..*len].iter_mut().zip(&roots[..L::COUNT]) {
+                *value = *root;
+            }
         }
-        RealRoots { values, len: self.len, certain: self.certain, close: false }
+        RealRoots { values, len: *len, certain: *certain, close: false }
     }
 }
 
-/// Two intervals with one root each, side by side.
-#[derive(Clone, Copy, Default)]
-struct TwoBrackets {
-    low: Two,
-    high: Two,
+/// Intervals with one root each, abreast.
+#[derive(Clone, Copy)]
+struct ManyBrackets<V: Float<f64>> {
+    low: V,
+    high: V,
     /// The best estimates.
-    x: Two,
-    /// Masks: whether the polynomial is positive at `low`, and whether the estimate is good to all digits.
-    positive_below: Two,
-    is_found: Two,
+    x: V,
+    /// The sign of the polynomial at `low`.
+    sign: V,
+    /// Where the estimate is not good to all digits yet.
+    active: V::Mask,
 }
 
-impl TwoBrackets {
-    #[inline]
-    fn new(first: &Bracket, second: &Bracket) -> Self {
-        let low = Two::new([first.low, second.low]);
-        let high = Two::new([first.high, second.high]);
-        let sign = [first, second].map(|bracket| if bracket.negative_below { -1.0 } else { 1.0 });
-        Self {
-            low,
-            high,
-            x: (low + high) * 0.5,
-            positive_below: Two::new(sign).simd_gt(Two::ZERO),
-            is_found: Two::ZERO,
+impl<V: Float<f64>> ManyBrackets<V> {
+    /// The first of some intervals; what is left of the lanes repeats the first, or has none.
+    #[inline(always)]
+    fn new<L: Lanes<f64, Float = V>>(lanes: L, brackets: &[Bracket]) -> Self {
+        let mut columns = [[0.0; MAX_F64_LANES]; 3];
+        for k in 0..L::COUNT {
+            if let Some(bracket) = brackets.get(k).or(brackets.first()) {
+                let sign = if bracket.negative_below { -1.0 } else { 1.0 };
+                [columns[0][k], columns[1][k], columns[2][k]] = [bracket.low, bracket.high, sign];
+            }
         }
+        let [low, high, sign] = columns.each_ref().map(|column| lanes.load(column));
+        let active = lanes.splat(0.0).less(lanes.splat(1.0));
+        Self { low, high, x: (low + high) * lanes.splat(0.5), sign, active }
     }
 
-    /// A step of each that is not found already. Whether both are then.
-    #[inline]
-    fn step<const N: usize>(&mut self, p: &[f64; N]) -> bool {
+    /// A step of each that is not found already.
+    #[inline(always)]
+    fn step<L: Lanes<f64, Float = V>, const N: usize>(&mut self, lanes: L, p: &[f64; N]) {
         let Self { x, .. } = *self;
-        let (value, laguerre) = laguerre(p, x);
-        let is_below = value.simd_lt(Two::ZERO) ^ self.positive_below;
-        self.low = is_below.select(x, self.low);
-        self.high = is_below.select(self.high, x);
+        let (value, laguerre) = laguerre(lanes, p, x);
+        let is_below = lanes.splat(0.0).less(value * self.sign);
+        self.low = x.select(is_below, self.low);
+        self.high = self.high.select(is_below, x);
         // Convergence is cubic: a step of a third of the digits is the last one. At a root rounding decides on which side it is.
-        let short = (x.abs() + 1e-4) * 1e-5;
-        let inside = laguerre.simd_gt(self.low) & laguerre.simd_lt(self.high);
-        let is_taken = inside | (laguerre - x).abs().simd_le(short);
-        let next = is_taken.select(laguerre, (self.low + self.high) * 0.5);
-        self.x = self.is_found.select(x, next);
-        self.is_found |= (next - x).abs().simd_le(short);
-        self.is_found.all()
+        let short = (x.abs() + lanes.splat(1e-4)) * lanes.splat(1e-5);
+        let inside = self.low.less(laguerre).and(laguerre.less(self.high));
+        let is_taken = inside.or((laguerre - x).abs().less(short));
+        let next = laguerre.select(is_taken, (self.low + self.high) * lanes.splat(0.5));
+        self.x = next.select(self.active, x);
+        self.active = self.active.and(short.less((next - x).abs()));
     }
 }
 
@@ -178,21 +205,21 @@ fn value<const N: usize>(p: &[f64; N], x: Two) -> Two {
 /// x − n p / (p' ± √((n − 1) ((n − 1) p'² − n p p'')))
 /// p' = o + 2 x (e' + x o')        p'' / 2 = e' + 3 x o' + 4 y (e'' / 2 + x o'' / 2)
 /// ```
-#[inline]
-fn laguerre<const N: usize>(p: &[f64; N], x: Two) -> (Two, Two) {
-    let y = x * x;
-    let [[mut e0, mut e1, mut e2], [mut o0, mut o1, mut o2]] = [[Two::ZERO; 3]; 2];
+#[inline(always)]
+fn laguerre<L: Lanes<f64>, const N: usize>(lanes: L, p: &[f64; N], x: F<L>) -> (F<L>, F<L>) {
+    let (y, zero) = (x * x, lanes.splat(0.0));
+    let [[mut e0, mut e1, mut e2], [mut o0, mut o1, mut o2]] = [[zero; 3]; 2];
     for k in (0..N.div_ceil(2)).rev() {
-        (e2, e1, e0) = (e2 * y + e1, e1 * y + e0, e0 * y + p[2 * k]);
+        (e2, e1, e0) = (e2.mul_add(y, e1), e1.mul_add(y, e0), e0.mul_add(y, lanes.splat(p[2 * k])));
         if 2 * k + 1 < N {
-            (o2, o1, o0) = (o2 * y + o1, o1 * y + o0, o0 * y + p[2 * k + 1]);
+            (o2, o1, o0) = (o2.mul_add(y, o1), o1.mul_add(y, o0), o0.mul_add(y, lanes.splat(p[2 * k + 1])));
         }
     }
-    let value = e0 + x * o0;
-    let slope = o0 + (x + x) * (e1 + x * o1);
-    let half_bend = e1 + x * o1 * 3.0 + y * (e2 + x * o2) * 4.0;
-    let (n, less) = ((N - 1) as f64, (N - 2) as f64);
-    let square = (slope * slope * less - value * half_bend * (2.0 * n)) * less;
-    let root = square.max(Two::ZERO).sqrt().copysign(slope);
-    (value, x - value * n / (slope + root))
+    let value = x.mul_add(o0, e0);
+    let slope = (x + x).mul_add(x.mul_add(o1, e1), o0);
+    let half_bend = (y * lanes.splat(4.0)).mul_add(x.mul_add(o2, e2), (x * lanes.splat(3.0)).mul_add(o1, e1));
+    let (n, less) = (lanes.splat((N - 1) as f64), lanes.splat((N - 2) as f64));
+    let square = (slope * slope * less - value * half_bend * (n + n)) * less;
+    let root = square.select(zero.less(square), zero).sqrt();
+    (value, x - value * n / (slope + (-root).select(slope.less(zero), root)))
 }

@@ -4,6 +4,9 @@
     reason = "a call would leave the instructions that a loop was dispatched to (`widest`, `instructions`)"
 )]
 
+pub(crate) mod abreast;
+pub(crate) mod columns;
+pub(crate) mod geometry;
 pub(crate) mod instructions;
 pub(crate) mod lane;
 pub(crate) mod portable;

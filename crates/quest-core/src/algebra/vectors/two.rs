@@ -6,6 +6,89 @@ use std::array::from_fn;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 pub(crate) use wide::f64x2 as Two;
 
+use crate::algebra::vectors::lane::{Float, Lanes, Mask};
+
+/// Two lanes, in the registers that nearly every processor has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TwoLanes;
+
+impl Lanes<f64> for TwoLanes {
+    const COUNT: usize = 2;
+    type Float = Two;
+
+    #[inline(always)]
+    fn splat(self, x: f64) -> Two {
+        Two::splat(x)
+    }
+
+    #[inline(always)]
+    fn load(self, x: &[f64]) -> Two {
+        Two::new([x[0], x[1]])
+    }
+}
+
+impl Float<f64> for Two {
+    /// All bits of a number, or none.
+    type Mask = Self;
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        c - self * b
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self::abs(self)
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> Self {
+        self.simd_lt(other)
+    }
+
+    #[inline(always)]
+    fn select(self, mask: Self, other: Self) -> Self {
+        Self::select(mask, self, other)
+    }
+
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        self.reduce_add()
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f64]) {
+        out[..2].copy_from_slice(&self.to_array());
+    }
+}
+
+impl Mask for Two {
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        self & other
+    }
+
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        self | other
+    }
+
+    #[inline(always)]
+    fn any(self) -> bool {
+        Self::any(self)
+    }
+}
+
 /// Two vectors.
 pub(crate) type TwoVectors = [Two; 3];
 

@@ -6,10 +6,10 @@
 //! `R0` need not be the best alignment to the last digit: any rotation gives the same essential matrices, and one that leaves
 //! little more than the least `p` keeps the rows well scaled.
 
-use crate::algebra::vectors::lane::{F, Float, Lanes};
-use crate::lanes::stages::geometry::{
+use crate::algebra::vectors::geometry::{
     Matrix3, Quaternion, Vector3, cross, dot, normalized, product, rotation,
 };
+use crate::algebra::vectors::lane::{F, Float, Lanes};
 
 /// Above the largest possible sum of the cosines of five matches by as much as keeps the factorisation regular where the
 /// bearings are exactly aligned.

@@ -3,9 +3,7 @@
 pub(crate) mod cubics;
 pub(crate) mod elimination;
 pub(crate) mod frame;
-pub(crate) mod geometry;
 pub(crate) mod isolation;
-pub(crate) mod motion;
 pub(crate) mod null_space;
 pub(crate) mod resultant;
 pub(crate) mod roots;

@@ -1,9 +1,9 @@
 //! Three equations `X(z) x + Y(z) y + W(z) = 0`, their determinant of degree ten, and the number of its real roots.
 
+use crate::algebra::vectors::geometry::{cross, longest};
 use crate::algebra::vectors::lane::{F, Float, Lanes};
 use crate::algebra::vectors::twice::{Twice, TwiceLanes, twice};
 use crate::lanes::stages::elimination::ROWS;
-use crate::lanes::stages::geometry::{cross, longest};
 
 /// A polynomial of degree ten, coefficients from the constant up.
 pub(crate) type Polynomial<L> = [F<L>; 11];

@@ -4,6 +4,8 @@ use nalgebra::Complex;
 
 use crate::algebra::number::TwoComplex;
 use crate::algebra::polynomial::{RealRoots, complex_roots, real_roots};
+use crate::algebra::vectors::abreast::{abreast, is_wide};
+use crate::algebra::vectors::lane::MAX_F64_LANES;
 use crate::algebra::vectors::two::{Two, TwoQuaternions};
 use crate::solver::Kinds;
 use crate::solver::quest::cubics::{combine, ten_cubics};
@@ -11,6 +13,7 @@ use crate::solver::shared::essential::{decomposed, real_part, twisted};
 use crate::solver::shared::newton_pair::{TwoMotions, after, normalized};
 use crate::solver::shared::parallax_frame::{Alignment, Coordinates};
 use crate::solver::shared::resultant::Resultant;
+use crate::solver::shared::roots_abreast::{SolveRoots, Solved};
 use crate::solver::shared::shortlist::Shortlist;
 use crate::{CandidateKind, Correspondence, Degeneracy};
 
@@ -25,7 +28,7 @@ pub(crate) fn from_five(
     for mixing in MIXINGS {
         shortlist.retain(CandidateKind::Exact);
         let roots = Roots::new(&basis, alignment);
-        let complete = roots.real(|two, count| shortlist.push_solutions(two, count, alignment, matches));
+        let complete = roots.push_real(matches, shortlist);
         // Where the roots are in doubt, two real ones may have become complex.
         if kinds == Kinds::All || !complete {
             roots.complex(|q_21, nearly_real| {
@@ -99,6 +102,32 @@ impl<'a> Roots<'a> {
         Self { basis, alignment, resultant, polynomial, real }
     }
 
+    /// Adds the solutions of the real roots. Whether every root was found and led to one.
+    fn push_real(&self, matches: &[Correspondence; 5], shortlist: &mut Shortlist) -> bool {
+        if !is_wide() {
+            return self.real(|two, count| shortlist.push_solutions(two, count, self.alignment, matches));
+        }
+        let (mut complete, mut out) = (self.real.certain, Solved::new());
+        for z in self.real.as_slice().chunks(MAX_F64_LANES) {
+            abreast(self.solving(z, matches, &mut out));
+            for k in 0..z.len() {
+                complete &= shortlist.push_solved(|| out.start(k), out.solution(k));
+            }
+        }
+        complete
+    }
+
+    /// The work that leads from some of the real roots to solutions.
+    fn solving<'b>(
+        &'b self,
+        z: &'b [f64],
+        matches: &'b [Correspondence; 5],
+        out: &'b mut Solved,
+    ) -> SolveRoots<'b> {
+        let Self { basis, alignment, resultant: equations, .. } = self;
+        SolveRoots { basis, alignment, equations, z, matches, out }
+    }
+
     /// Hands over the motions of the real roots, with one of the two rotations of each: two at a time, and how many of them
     /// count. Whether every root was found and `accept` took all its motions.
     pub(crate) fn real(&self, mut accept: impl FnMut(&TwoMotions, usize) -> bool) -> bool {
@@ -129,5 +158,60 @@ impl<'a> Roots<'a> {
                 accept(&q_21, z.im < nearly_real * (1.0 + z.re.abs()));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algebra::vectors::abreast::{Wide, Work};
+    use crate::algebra::vectors::instructions::{Instructions, Token};
+    use crate::algebra::vectors::two::TwoLanes;
+    use crate::simulate::{Scene, SceneOptions};
+    use crate::solver::shared::motion::Motion;
+
+    #[test]
+    fn solutions_are_those_of_two_motions_side_by_side() {
+        let tokens = [Instructions::Avx2, Instructions::Avx512].map(Token::new);
+        let mut count = 0;
+        for index in 0..1_000 {
+            let noise_px = if index % 2 == 0 { 0.75 } else { 0.0 };
+            let options = SceneOptions { points: 5, noise_px, ..SceneOptions::realistic() };
+            let matches = Scene::generate(&options, 21, index).unwrap().matches;
+            let matches: [Correspondence; 5] = matches.try_into().unwrap();
+            let alignment = Alignment::new(&matches);
+            let basis = alignment.null_space(&matches).unwrap();
+            let roots = Roots::new(&basis, &alignment);
+            let mut expected = Vec::new();
+            roots.real(|two, count| {
+                expected.extend(two.solutions(&alignment, &matches).into_iter().take(count));
+                true
+            });
+            for z in roots.real.as_slice().chunks(MAX_F64_LANES) {
+                let rest = expected.split_off(z.len());
+                for token in tokens.into_iter().flatten().map(Some).chain([None]) {
+                    let mut out = Solved::new();
+                    let work = roots.solving(z, &matches, &mut out);
+                    match token {
+                        Some(token) => token.run(Wide(work)),
+                        None => work.run(TwoLanes),
+                    }
+                    for (k, expected) in expected.iter().enumerate() {
+                        let found = out.solution(k);
+                        assert_eq!(found.is_some(), expected.is_some(), "{token:?}, scene {index}");
+                        let (Some(found), Some(expected)) = (found, expected) else { continue };
+                        let is_near = |m: Motion| {
+                            let (p, q) = (m.q_21.coords, expected.q_21.coords);
+                            (p - q).norm().min((p + q).norm()) < 1e-10
+                        };
+                        assert!(is_near(found) || is_near(found.twisted()), "{token:?}, scene {index}");
+                        assert!(found.direction.cross(&expected.direction).norm() < 1e-10);
+                        count += 1;
+                    }
+                }
+                expected = rest;
+            }
+        }
+        assert!(count > 4_000, "{count}");
     }
 }

@@ -4,49 +4,68 @@
 //! solution by more than the rounding of the bearings does. Cut at a fixed place, 26 bits behind the point, the leading parts of two
 //! factors have a product of 52 bits behind the point, and sums of those that stay below 2 are exact; what is left is 2⁻²⁶ times as
 //! large, and so is its rounding.
+#![expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
 
-use crate::algebra::vectors::two::{Two, TwoVectors};
+use crate::algebra::vectors::geometry::{Matrix3, Vector3};
+use crate::algebra::vectors::lane::{F, Float, Lanes};
 
 /// `1.5 × 2²⁶`: beside it a number of order one keeps 26 bits behind the point.
 const CUT: f64 = 1.5 * (1_u64 << 26) as f64;
 
-/// Two numbers of order one, and what they are cut into.
+/// Numbers of order one, and what they are cut into.
 #[derive(Clone, Copy)]
-pub(crate) struct Split {
-    whole: Two,
+struct Split<V> {
+    whole: V,
     /// Multiples of 2⁻²⁶.
-    high: Two,
+    high: V,
     /// The rest, at most 2⁻²⁷.
-    low: Two,
+    low: V,
 }
 
-impl Split {
-    #[inline]
-    pub(crate) fn new(whole: Two) -> Self {
-        let high = (whole + Two::splat(CUT)) - Two::splat(CUT);
-        Self { whole, high, low: whole - high }
-    }
+#[inline(always)]
+fn split<L: Lanes<f64>>(lanes: L, whole: F<L>) -> Split<F<L>> {
+    let high = (whole + lanes.splat(CUT)) - lanes.splat(CUT);
+    Split { whole, high, low: whole - high }
+}
+
+#[inline(always)]
+fn split_vector<L: Lanes<f64>>(lanes: L, v: &Vector3<L>) -> [Split<F<L>>; 3] {
+    [split(lanes, v[0]), split(lanes, v[1]), split(lanes, v[2])]
 }
 
 /// The product of two vectors as multiples of 2⁻⁵², without rounding, and the rest.
-#[inline]
-fn dot(x: &[Split; 3], y: &[Split; 3]) -> (Two, Two) {
-    let high = |k: usize| x[k].high * y[k].high;
-    let rest = |k: usize| x[k].whole * y[k].low + x[k].low * y[k].high;
-    (high(0) + high(1) + high(2), rest(0) + rest(1) + rest(2))
+#[inline(always)]
+fn dot<L: Lanes<f64>>(x: &[Split<F<L>>; 3], y: &[Split<F<L>>; 3]) -> (F<L>, F<L>) {
+    let (mut high, mut rest) = (x[0].high * y[0].high, x[0].low.mul_add(y[0].high, x[0].whole * y[0].low));
+    for k in 1..3 {
+        high = x[k].high.mul_add(y[k].high, high);
+        rest = rest + x[k].low.mul_add(y[k].high, x[k].whole * y[k].low);
+    }
+    (high, rest)
 }
 
-/// `bᵀ E a`.
-#[inline]
-pub(crate) fn form(b: &TwoVectors, e: &[[Split; 3]; 3], a: &TwoVectors) -> Two {
-    let (b, a) = (b.map(Split::new), a.map(Split::new));
-    let image = e.each_ref().map(|row| {
-        let (high, rest) = dot(row, &a);
-        let cut = Split::new(high);
-        Split { low: cut.low + rest, ..cut }
-    });
-    let (high, rest) = dot(&b, &image);
-    high + rest
+/// Essential matrices, cut.
+pub(crate) struct SplitEssential<L: Lanes<f64>>([[Split<F<L>>; 3]; 3]);
+
+impl<L: Lanes<f64>> SplitEssential<L> {
+    #[inline(always)]
+    pub(crate) fn new(lanes: L, [x, y, z]: &Matrix3<L>) -> Self {
+        Self([split_vector(lanes, x), split_vector(lanes, y), split_vector(lanes, z)])
+    }
+
+    /// `bᵀ E a`.
+    #[inline(always)]
+    pub(crate) fn form(&self, lanes: L, b: &Vector3<L>, a: &Vector3<L>) -> F<L> {
+        let (mut image, a) = (split_vector(lanes, b), split_vector(lanes, a));
+        let b = image;
+        for k in 0..3 {
+            let (high, rest) = dot::<L>(&self.0[k], &a);
+            let cut = split(lanes, high);
+            image[k] = Split { low: cut.low + rest, ..cut };
+        }
+        let (high, rest) = dot::<L>(&b, &image);
+        high + rest
+    }
 }
 
 #[cfg(test)]
@@ -55,6 +74,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::algebra::vectors::two::{Two, TwoLanes};
 
     /// Multiples of 2⁻³⁵: the products of three are multiples of 2⁻¹⁰⁵, and integers of 128 bits hold their sums.
     const UNIT: f64 = (1_u64 << 35) as f64;
@@ -75,8 +95,8 @@ mod tests {
             };
             // What is left is of the size of a unit.
             e[2][2] = (-form_of(&e) / (a[2] * b[2]) * UNIT).round() / UNIT;
-            let split = e.map(|row| row.map(|x| Split::new(Two::splat(x))));
-            let [found, _] = form(&b.map(Two::splat), &split, &a.map(Two::splat)).to_array();
+            let split = SplitEssential::new(TwoLanes, &e.map(|row| row.map(Two::splat)));
+            let [found, _] = split.form(TwoLanes, &b.map(Two::splat), &a.map(Two::splat)).to_array();
             let exact = form_of(&e);
             assert!(exact.abs() < 1.0 / UNIT);
             // Fifteen roundings of numbers up to 2⁻²⁵, each by 2⁻⁷⁸ at most.

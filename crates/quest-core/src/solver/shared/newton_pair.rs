@@ -7,20 +7,41 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::Correspondence;
 use crate::algebra::vectors::two::{
-    Two, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled, side_by_side,
-    unit_quaternions,
+    Two, TwoLanes, TwoQuaternions, TwoVectors, both, cross, dot, product, quaternions, rotation, scaled,
+    side_by_side, unit_quaternions,
 };
-use crate::solver::shared::double_residual::{self, Split};
+use crate::solver::shared::double_residual::SplitEssential;
 use crate::solver::shared::essential::decomposed;
 use crate::solver::shared::motion::Motion;
 use crate::solver::shared::parallax_frame::Alignment;
 use crate::structure::translation_directions;
 
 /// Newton's iteration takes one or two steps; a double root takes them all.
-const MAX_NEWTON_STEPS: usize = 10;
+pub(crate) const MAX_NEWTON_STEPS: usize = 10;
 
 /// The squares of five constraints whose unit bearings are rounded, with a margin.
 const ROUNDING: f64 = 1e-30;
+
+/// When Newton's iteration has converged.
+pub(crate) struct Convergence {
+    /// A step whose square is below this.
+    pub(crate) limit: f64,
+    /// What the square of the first turn is multiplied by: all solutions are within the parallax in rotation, so that it has to be small
+    /// beside it.
+    pub(crate) per_parallax: f64,
+    /// Constraints whose squares sum up to less, where the steps come to no end.
+    pub(crate) rounding: f64,
+}
+
+impl Convergence {
+    pub(crate) fn new(alignment: &Alignment) -> Self {
+        Self {
+            limit: alignment.direction_resolution().max(1e-7).powi(2),
+            per_parallax: alignment.parallax.powi(-2).max(1.0),
+            rounding: ROUNDING,
+        }
+    }
+}
 
 /// Two relative poses without the length of their translations.
 #[derive(Clone, Copy)]
@@ -79,8 +100,7 @@ impl TwoMotions {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> [Option<Motion>; 2] {
-        let limit = alignment.direction_resolution().max(1e-7).powi(2);
-        let per_parallax = alignment.parallax.powi(-2).max(1.0);
+        let Convergence { limit, per_parallax, rounding } = Convergence::new(alignment);
         let (mut motions, mut is_over, mut has_converged) = (*self, Two::ZERO, Two::ZERO);
         let mut rest = Two::splat(f64::INFINITY);
         for count in 0..MAX_NEWTON_STEPS {
@@ -89,8 +109,7 @@ impl TwoMotions {
             let is_step = (turn + moved).simd_le(Two::splat(1.0));
             motions.q_21 = select(is_step & !is_over, &next.q_21, &motions.q_21);
             motions.direction = select(is_step & !is_over, &next.direction, &motions.direction);
-            // Quadratic: the error left is the square of the step. All solutions are within the parallax in rotation, so that
-            // the first step has to be small beside it.
+            // Quadratic: the error left is the square of the step.
             let size = if count == 0 { turn * per_parallax + moved } else { turn + moved };
             has_converged |= size.simd_lt(Two::splat(limit)) & !is_over;
             rest = residual;
@@ -100,7 +119,7 @@ impl TwoMotions {
             }
         }
         // Near another solution the steps of rounding are longer, and come to no end.
-        has_converged |= rest.simd_lt(Two::splat(ROUNDING)) & !is_over;
+        has_converged |= rest.simd_lt(Two::splat(rounding)) & !is_over;
         let ([first, second], converged) = (motions.apart(), has_converged.to_bitmask());
         [first.filter(|_| converged & 1 != 0), second.filter(|_| converged & 2 != 0)]
     }
@@ -110,13 +129,13 @@ impl TwoMotions {
         let t = &self.direction;
         let [e1, e2] = tangent_basis(t);
         let r_21 = rotation(&self.q_21);
-        let essential = essential(t, &r_21).map(|row| row.map(Split::new));
+        let essential = SplitEssential::new(TwoLanes, &essential(t, &r_21));
         let equations = matches.each_ref().map(|m| {
             let (a, b) = (both(m.bearing1()), both(m.bearing2()));
             let c = r_21.map(|row| dot(&row, &a));
             let (n, bc, tc) = (cross(&b, &c), dot(&b, &c), dot(t, &c));
             let [g1, g2, g3] = std::array::from_fn(|k| t[k] * bc - b[k] * tc);
-            [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), double_residual::form(&b, &essential, &a)]
+            [g1, g2, g3, dot(&n, &e1), dot(&n, &e2), essential.form(TwoLanes, &b, &a)]
         });
         let residual = equations.iter().fold(Two::ZERO, |sum, row| sum + row[5] * row[5]);
         let [w1, w2, w3, move1, move2] = solve(equations);

@@ -18,9 +18,9 @@ const FIRST_USED: usize = 4;
 
 /// Three equations `X(z) x + Y(z) y + W(z) = 0`; coefficients from the constant up.
 pub(crate) struct Resultant {
-    x: [[f64; 4]; 3],
-    y: [[f64; 4]; 3],
-    w: [[f64; 5]; 3],
+    pub(crate) x: [[f64; 4]; 3],
+    pub(crate) y: [[f64; 4]; 3],
+    pub(crate) w: [[f64; 5]; 3],
 }
 
 impl Resultant {

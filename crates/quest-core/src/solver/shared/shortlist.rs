@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::algebra::vectors::columns::MotionColumns;
+use crate::algebra::vectors::lane::MAX_F64_LANES;
 use crate::algebra::vectors::two::Two;
 use crate::degeneracy::{all_parallel, diagnose};
 use crate::feasibility::in_front;
@@ -11,7 +13,7 @@ use crate::solver::shared::gram::Gram;
 use crate::solver::shared::motion::{COARSE, FINE, Motion, Until};
 use crate::solver::shared::newton_pair::{TwoMotions, solution};
 use crate::solver::shared::parallax_frame::Alignment;
-use crate::structure::{Completed, two_pairs_with_depths, two_with_depths, with_depths, with_noise};
+use crate::structure::{Completed, CompletedColumns, many_with_depths, with_depths, with_noise};
 use crate::{Candidate, CandidateKind, Candidates, Correspondence, Degeneracy, RelativePose};
 
 /// Solutions closer than this, in rotation and in direction of translation (radians), are one.
@@ -161,15 +163,25 @@ impl Shortlist {
         alignment: &Alignment,
         matches: &[Correspondence; 5],
     ) -> bool {
-        let solutions = starts.solutions(alignment, matches);
-        for (k, solution) in solutions.iter().enumerate().take(count) {
-            if let Some(motion) = solution {
-                self.push_pair(CandidateKind::Exact, *motion);
-            } else if let Some(start) = starts.apart()[k] {
-                self.push(CandidateKind::FromComplex, start);
-            }
+        let mut complete = true;
+        for (k, solution) in starts.solutions(alignment, matches).into_iter().enumerate().take(count) {
+            complete &= self.push_solved(|| starts.apart()[k], solution);
         }
-        solutions[..count].iter().all(Option::is_some)
+        complete
+    }
+
+    /// Adds a solution, or its start where it has led to none. Whether there is one.
+    pub(crate) fn push_solved(
+        &mut self,
+        start: impl FnOnce() -> Option<Motion>,
+        solution: Option<Motion>,
+    ) -> bool {
+        if let Some(motion) = solution {
+            self.push_pair(CandidateKind::Exact, motion);
+        } else if let Some(start) = start() {
+            self.push(CandidateKind::FromComplex, start);
+        }
+        solution.is_some()
     }
 
     /// Adds the solutions near two real essential matrices.
@@ -257,26 +269,27 @@ impl Shortlist {
 
     /// Fills `out` with translations, depths, residuals and the order of [`Candidates`].
     pub(crate) fn write(&self, kinds: Kinds, matches: &[Correspondence], out: &mut Candidates) {
+        let (mut motions, mut completed) = (MotionColumns::new(), [const { CompletedColumns::new() }; 2]);
         for is_pair in [true, false] {
             let is_wanted = |item: &&Item| kinds == Kinds::All || item.kind == CandidateKind::Exact;
             let mut items = self.iter().filter(is_wanted).filter(|item| item.is_pair == is_pair);
-            while let Some(first) = items.next() {
-                let second = items.next();
-                let count = 1 + usize::from(second.is_some());
-                let two = [first, second.unwrap_or(first)];
-                let TwoMotions { q_21, direction } = TwoMotions::new(&two[0].motion, &two[1].motion);
-                let mut push = |completed: [Completed; 2]| {
-                    for (item, completed) in two.iter().zip(completed).take(count) {
-                        let completed = in_noise(item.kind, completed, matches);
-                        out.push(candidate(item.kind, &completed));
+            loop {
+                let (mut some, mut count) = ([CandidateKind::Exact; MAX_F64_LANES], 0);
+                for item in items.by_ref().take(MAX_F64_LANES) {
+                    motions.set(count, &item.motion.q_21, &item.motion.direction);
+                    some[count] = item.kind;
+                    count += 1;
+                }
+                if count == 0 {
+                    break;
+                }
+                // A motion of a pair and its twisted partner.
+                let completed = &mut completed[..=usize::from(is_pair)];
+                many_with_depths(&motions, count, matches, completed);
+                for (k, kind) in some[..count].iter().enumerate() {
+                    for columns in &*completed {
+                        out.push(candidate(*kind, &in_noise(*kind, columns.get(k, matches), matches)));
                     }
-                };
-                if is_pair {
-                    let [motions, twisted] = two_pairs_with_depths(&q_21, &direction, matches);
-                    push(motions);
-                    push(twisted);
-                } else {
-                    push(two_with_depths(&q_21, &direction, matches));
                 }
             }
         }

@@ -44,6 +44,12 @@ pub(crate) fn normalized<L: Lanes<f64>, const N: usize>(lanes: L, a: [F<L>; N]) 
     scaled::<L, N>(a, lanes.splat(1.0) / dot::<L, N>(&a, &a).sqrt())
 }
 
+/// The same vector for all.
+#[inline(always)]
+pub(crate) fn splat<L: Lanes<f64>>(lanes: L, v: &nalgebra::Vector3<f64>) -> Vector3<L> {
+    [lanes.splat(v.x), lanes.splat(v.y), lanes.splat(v.z)]
+}
+
 /// The longest of three vectors, and its squared length.
 #[inline(always)]
 pub(crate) fn longest<L: Lanes<f64>>(vectors: &[Vector3<L>; 3]) -> (Vector3<L>, F<L>) {

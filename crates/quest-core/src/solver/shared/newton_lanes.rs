@@ -6,12 +6,13 @@
 //! ```text
 //! dr = ω · (c × (t × b)) + δ1 n · e1 + δ2 n · e2,   n = b × c
 //! ```
+#![expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
 
-use crate::algebra::vectors::lane::{F, Float, Lanes, M};
-use crate::lanes::stages::geometry::{
+use crate::algebra::vectors::geometry::{
     Matrix3, Quaternion, Vector3, composed, cross, dot, longest, normalized, product, quaternion, rotation,
     scaled,
 };
+use crate::algebra::vectors::lane::{F, Float, Lanes, M};
 
 /// A relative pose without the length of its translation.
 #[derive(Clone, Copy)]
@@ -60,22 +61,34 @@ impl<L: Lanes<f64>> Motion<L> {
         self
     }
 
-    /// One of Newton's steps to the solution of the constraints of five matches, given by their bearings in views 1 and 2, and
-    /// the square of its length (radians).
+    /// After another rotation `q0_21`: `R ← R R0`.
     #[inline(always)]
-    pub(crate) fn step(&self, lanes: L, bearings: impl Fn(usize) -> [Vector3<L>; 2]) -> (Self, F<L>) {
+    pub(crate) fn after(&self, q0_21: &Quaternion<L>) -> Self {
+        Self { q_21: composed::<L>(&self.q_21, q0_21), ..*self }
+    }
+
+    /// One of Newton's steps to the solution of the constraints of five matches, given by their bearings in views 1 and 2.
+    /// `refined` has a constraint to more digits, if it knows how; its value in plain ones is handed over.
+    #[inline(always)]
+    pub(crate) fn step(
+        &self,
+        lanes: L,
+        bearings: impl Fn(usize) -> [Vector3<L>; 2],
+        refined: impl Fn(usize, F<L>) -> F<L>,
+    ) -> Step<L> {
         let (one, half) = (lanes.splat(1.0), lanes.splat(0.5));
         let t = &self.t;
         let [e1, e2] = tangent_basis(lanes, t);
         let r_21 = rotation(lanes, &self.q_21);
-        let mut equations = [[one; 6]; 5];
+        let (mut equations, mut square) = ([[one; 6]; 5], lanes.splat(0.0));
         for i in 0..5 {
             let [a, b] = bearings(i);
             let c = product::<L>(&r_21, &a);
             let n = cross::<L>(&b, &c);
             let g = cross::<L>(&c, &cross::<L>(t, &b));
-            equations[i] =
-                [g[0], g[1], g[2], dot::<L, 3>(&n, &e1), dot::<L, 3>(&n, &e2), -dot::<L, 3>(&n, t)];
+            let constraint = refined(i, -dot::<L, 3>(&n, t));
+            square = constraint.mul_add(constraint, square);
+            equations[i] = [g[0], g[1], g[2], dot::<L, 3>(&n, &e1), dot::<L, 3>(&n, &e2), constraint];
         }
         let step = solve(lanes, &mut equations);
         let turn = [one, half * step[0], half * step[1], half * step[2]];
@@ -84,7 +97,12 @@ impl<L: Lanes<f64>> Motion<L> {
             moved[i] = e2[i].mul_add(step[4], e1[i].mul_add(step[3], t[i]));
         }
         let q_21 = normalized::<L, 4>(lanes, composed::<L>(&turn, &self.q_21));
-        (Self { q_21, t: normalized::<L, 3>(lanes, moved) }, dot::<L, 5>(&step, &step))
+        Step {
+            next: Self { q_21, t: normalized::<L, 3>(lanes, moved) },
+            turn: dot::<L, 3>(&[step[0], step[1], step[2]], &[step[0], step[1], step[2]]),
+            moved: step[4].mul_add(step[4], step[3] * step[3]),
+            square,
+        }
     }
 
     /// The essential matrix `[t]× R`, row by row.
@@ -100,6 +118,17 @@ impl<L: Lanes<f64>> Motion<L> {
         }
         e
     }
+}
+
+/// A step of Newton's iteration.
+pub(crate) struct Step<L: Lanes<f64>> {
+    /// Where it leads.
+    pub(crate) next: Motion<L>,
+    /// Its squared length (radians), in rotation and in the direction of the translation.
+    pub(crate) turn: F<L>,
+    pub(crate) moved: F<L>,
+    /// The sum of the squared constraints before it.
+    pub(crate) square: F<L>,
 }
 
 /// Two unit vectors that complete `t` to a right-handed frame (Duff et al., JCGT 2017).
