@@ -259,7 +259,7 @@ impl Found {
 const NO_PARALLAX: f64 = 1e-12;
 const DEPENDENT: f64 = 1e-8;
 /// An elimination that comes this close to singular has lost half of its digits.
-const SMALL_PIVOT: f64 = 1e-8;
+const SMALL_PIVOT: f64 = 3e-8;
 
 /// The product of a match's two angles from the epipoles, in square radians, below which its side may be noise: ten pixels of a
 /// focal length of a thousand in both views.
@@ -294,7 +294,7 @@ fn solve_group<L: WordLanes>(
     let (frame, mut rows) = frame(lanes, &a, &b);
     let (basis, independence) = null_space(lanes, &mut rows);
     cubics::fill(lanes, &basis, frame.parallax, &mut space.cubics);
-    let (reduced, pivot) = reduce(lanes, &mut space.cubics);
+    let (reduced, pivot) = reduce(lanes, &space.cubics);
     let resultant = Resultant::<L>::new(lanes, &reduced);
     let polynomial = resultant.polynomial(lanes);
     let mirrored = roots::mirrored::<L>(&polynomial);

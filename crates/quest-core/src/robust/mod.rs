@@ -161,7 +161,7 @@ fn search<'a>(
         max_iterations: options.max_iterations,
         is_cancelled,
     };
-    let mut source = hypotheses::of_solver(options.solver);
+    let mut source = hypotheses::of_solver(options.solver, observations.len());
     let size = options.solver.info().min_matches;
     let draws = Draws { rng, size, given: priors.ranked(observations) };
     let mut false_matches = None;

@@ -185,8 +185,7 @@ impl<S: Simd, A: Copy> WordLanes for Vector<S, A> {
 
     #[inline(always)]
     fn with_bit(self, words: S::u64s, mask: DoubleMask<S>, bit: u64) -> S::u64s {
-        let bits = self.0.select_u64s(mask.0, self.0.splat_u64s(bit), self.0.splat_u64s(0));
-        self.0.or_u64s(words, bits)
+        self.0.select_u64s(mask.0, self.0.or_u64s(words, self.0.splat_u64s(bit)), words)
     }
 
     #[inline(always)]

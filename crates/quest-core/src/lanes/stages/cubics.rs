@@ -1,10 +1,10 @@
 //! The ten cubics of the parallax-safe form, over twenty monomials, as the scalar solver's module derives them: with
-//! `h = tr S`, `Z = h I − 2 S` and `A = adj Z`
+//! `h = tr S`, `Z = h I − 2 S`, `Y = Z − ½ h I` and `A = adj Z`
 //!
 //! ```text
-//! (Z t) tᵀ + t (Z t)ᵀ − |t|² Z − h (t tᵀ + ¼ p² (tr(A) I − A)) = 0        six cubics
-//! A t = 0                                                                three
-//! det Z = 0                                                              one
+//! (Y t) tᵀ + t (Y t)ᵀ − |t|² Z + ¼ p² h (A − tr(A) I) = 0        six cubics
+//! A t = 0                                                       three
+//! det Z = 0                                                     one
 //! ```
 
 use crate::algebra::vectors::lane::{F, Float, Lanes};
@@ -33,45 +33,38 @@ pub(crate) fn empty<L: Lanes<f64>>(lanes: L) -> Cubics<L> {
 /// Fills the cubics.
 #[inline(always)]
 pub(crate) fn fill<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, p: F<L>, out: &mut Cubics<L>) {
-    let [t0, t1, t2, ..] = basis;
+    let [t0, t1, t2, s00, s11, s22, s01, s02, s12] = basis;
+    let [one, minus, minus_two] = [1.0, -1.0, -2.0].map(|x| lanes.splat(x));
     let t = [t0, t1, t2];
-    let minus = lanes.splat(-1.0);
-    let minus_trace = combined::<L, 3, 4>([(&basis[3], minus), (&basis[4], minus), (&basis[5], minus)]);
-    let z = traced(lanes, basis, &minus_trace);
-    let [xx, yy, zz, xy, xz, yz] = &z;
+    let minus_t = t.map(|t| combined::<L, 1, 4>([(t, minus)]));
+    let h = combined::<L, 3, 4>([(s00, one), (s11, one), (s22, one)]);
+    let less = |weight: f64, s| combined::<L, 2, 4>([(&h, lanes.splat(weight)), (s, minus_two)]);
+    let [xy, xz, yz] = [s01, s02, s12].map(|s| combined::<L, 1, 4>([(s, minus_two)]));
+    let [z_xx, z_yy, z_zz] = [s00, s11, s22].map(|s| less(1.0, s));
+    let [y_xx, y_yy, y_zz] = [s00, s11, s22].map(|s| less(0.5, s));
+    let z = [z_xx, z_yy, z_zz, xy, xz, yz];
     let turned = [
-        products::<L, 3>(lanes, [(xx, t0), (xy, t1), (xz, t2)]),
-        products::<L, 3>(lanes, [(xy, t0), (yy, t1), (yz, t2)]),
-        products::<L, 3>(lanes, [(xz, t0), (yz, t1), (zz, t2)]),
+        products::<L, 3>(lanes, [(&y_xx, t0), (&xy, t1), (&xz, t2)]),
+        products::<L, 3>(lanes, [(&xy, t0), (&y_yy, t1), (&yz, t2)]),
+        products::<L, 3>(lanes, [(&xz, t0), (&yz, t1), (&y_zz, t2)]),
     ];
-    let mut squares = [turned[0]; 6];
-    for (square, (i, j)) in squares.iter_mut().zip(PLACES) {
-        *square = products::<L, 1>(lanes, [(t[i], t[j])]);
-    }
-    let minus_square =
-        combined::<L, 3, 10>([(&squares[0], minus), (&squares[1], minus), (&squares[2], minus)]);
+    let minus_square = products::<L, 3>(lanes, [(&minus_t[0], t0), (&minus_t[1], t1), (&minus_t[2], t2)]);
     let a = adjugate(lanes, &z);
-    let beside = beside_trace(lanes, &squares, &a, p);
+    let quarter_h = combined::<L, 1, 4>([(&h, lanes.splat(0.25) * p * p)]);
     for (k, (i, j)) in PLACES.into_iter().enumerate() {
-        let (first, second) = ((&turned[i], t[j]), (&turned[j], t[i]));
-        set::<L, 4>(lanes, out, k, [first, second, (&minus_square, &z[k]), (&beside[k], &minus_trace)]);
+        let third = (&minus_square, &z[k]);
+        if i == j {
+            let twice_t = combined::<L, 1, 4>([(t[i], lanes.splat(2.0))]);
+            let less_trace = combined::<L, 2, 10>([(&a[(i + 1) % 3], minus), (&a[(i + 2) % 3], minus)]);
+            set::<L, 3>(lanes, out, k, [(&turned[i], &twice_t), third, (&less_trace, &quarter_h)]);
+        } else {
+            set::<L, 4>(lanes, out, k, [(&turned[i], t[j]), (&turned[j], t[i]), third, (&a[k], &quarter_h)]);
+        }
     }
     set::<L, 3>(lanes, out, 6, [(&a[0], t0), (&a[3], t1), (&a[4], t2)]);
     set::<L, 3>(lanes, out, 7, [(&a[3], t0), (&a[1], t1), (&a[5], t2)]);
     set::<L, 3>(lanes, out, 8, [(&a[4], t0), (&a[5], t1), (&a[2], t2)]);
-    set::<L, 3>(lanes, out, 9, [(&a[0], xx), (&a[3], xy), (&a[4], xz)]);
-}
-
-/// `Z = h I − 2 S`, by `−h`.
-#[inline(always)]
-fn traced<L: Lanes<f64>>(lanes: L, basis: &Basis<L>, minus_trace: &Linear<L>) -> Entries<Linear<L>> {
-    let (minus, minus_two) = (lanes.splat(-1.0), lanes.splat(-2.0));
-    let mut z = [*minus_trace; 6];
-    for k in 0..3 {
-        z[k] = combined::<L, 2, 4>([(minus_trace, minus), (&basis[3 + k], minus_two)]);
-        z[k + 3] = combined::<L, 1, 4>([(&basis[6 + k], minus_two)]);
-    }
-    z
+    set::<L, 3>(lanes, out, 9, [(&a[0], &z[0]), (&a[3], &z[3]), (&a[4], &z[4])]);
 }
 
 /// `A = adj Z`.
@@ -90,24 +83,6 @@ fn adjugate<L: Lanes<f64>>(lanes: L, z: &Entries<Linear<L>>) -> Entries<Quadrati
         products::<L, 2>(lanes, [(xy, yz), (minus_xz, yy)]),
         products::<L, 2>(lanes, [(xy, xz), (minus_yz, xx)]),
     ]
-}
-
-/// `t tᵀ + ¼ p² (tr(A) I − A)`, by `t tᵀ`.
-#[inline(always)]
-fn beside_trace<L: Lanes<f64>>(
-    lanes: L,
-    squares: &Entries<Quadratic<L>>,
-    a: &Entries<Quadratic<L>>,
-    p: F<L>,
-) -> Entries<Quadratic<L>> {
-    let (one, quarter) = (lanes.splat(1.0), lanes.splat(0.25) * p * p);
-    let mut out = *squares;
-    for k in 0..3 {
-        let (b, c) = (&a[(k + 1) % 3], &a[(k + 2) % 3]);
-        out[k] = combined::<L, 3, 10>([(&squares[k], one), (b, quarter), (c, quarter)]);
-        out[k + 3] = combined::<L, 2, 10>([(&squares[k + 3], one), (&a[k + 3], -quarter)]);
-    }
-    out
 }
 
 /// The sum of some forms with weights.

@@ -181,8 +181,8 @@ fn fill<L: WordLanes>(lanes: L, tables: &Tables, p: &Polynomial<L>, out: &mut Gr
             value.store(&mut out.values[j]);
             slope.store(&mut out.slopes[j]);
             at = lanes.with_bit(at, value.less(zero), 1 << j);
-            behind = lanes.with_bit(behind, (value + slope).less(zero), 1 << j);
-            before = lanes.with_bit(before, (value - slope).less(zero), 1 << j);
+            behind = lanes.with_bit(behind, value.less(-slope), 1 << j);
+            before = lanes.with_bit(before, value.less(slope), 1 << j);
         }
     }
     lanes.store_words(at, &mut out.negative);

@@ -21,11 +21,13 @@ pub(crate) trait HypothesisSource: std::fmt::Debug {
     fn hypotheses(&mut self, matches: &[Correspondence], samples: &[Sample], out: &mut Hypotheses);
 }
 
-/// The source that solves samples by the solver of this name.
-pub(crate) fn of_solver(solver: SolverName) -> Box<dyn HypothesisSource> {
+/// The source that solves samples of so many matches by the solver of this name. Few matches leave the refinement little to do, and may
+/// be exact: their hypotheses are as well.
+pub(crate) fn of_solver(solver: SolverName, matches: usize) -> Box<dyn HypothesisSource> {
+    let tolerance = if matches < MANY { Tolerance::Tight } else { Tolerance::Loop };
     match solver {
         SolverName::Quest => Box::new(Lanes {
-            solver: BatchSolver::new(Tolerance::Loop),
+            solver: BatchSolver::new(tolerance),
             samples: Vec::new(),
             found: Essentials::new(),
         }),
