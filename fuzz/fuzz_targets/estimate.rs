@@ -14,7 +14,7 @@ fuzz_target!(|bytes: &[u8]| {
     let options = Options {
         threshold: bytes.pick(&[1e-9, 1e-3, 1.5, 100.0]),
         focal_lengths: [[focal_length; 2]; 2],
-        max_iterations: bytes.pick(&[1, 8, 200, usize::MAX]),
+        max_iterations: bytes.pick(&[1, 8, 200, 5_000]),
         min_iterations: bytes.pick(&[1, 300]),
         confidence: bytes.pick(&[0.5, 0.9999]),
         max_false_alarms: bytes.pick(&[0.03, f64::INFINITY]),
@@ -38,5 +38,7 @@ fuzz_target!(|bytes: &[u8]| {
     if let Ok(found) = &found {
         invariants::estimate(found, matches.len());
     }
-    assert_eq!(found, robust::estimate_with(&matches, &options, &priors));
+    // An error may hold a NaN that was found, which equals nothing.
+    let again = robust::estimate_with(&matches, &options, &priors);
+    assert!(found == again || format!("{found:?}") == format!("{again:?}"), "{found:?}, then {again:?}");
 });

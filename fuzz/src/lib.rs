@@ -43,12 +43,17 @@ impl Choices for Bytes<'_> {
     }
 }
 
-/// Reads the bytes as a file of this format, and hands over the pairs that can be read.
-pub fn read(bytes: &[u8], format: Format, mut pair: impl FnMut(&quest_io::Pair)) {
-    let path: PathBuf = std::env::temp_dir().join(format!("quest-fuzz-{}", std::process::id()));
+/// The bytes as a file in the directory for temporary files, one for each process.
+pub fn written(bytes: &[u8], extension: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("quest-fuzz-{}.{extension}", std::process::id()));
     let written = std::fs::File::create(&path).and_then(|mut file| file.write_all(bytes));
     written.expect("a file in the directory for temporary files");
-    if let Ok(pairs) = quest_io::read(&path, Some(format)) {
+    path
+}
+
+/// Reads the bytes as a file of this format, and hands over the pairs that can be read.
+pub fn read(bytes: &[u8], format: Format, mut pair: impl FnMut(&quest_io::Pair)) {
+    if let Ok(pairs) = quest_io::read(&written(bytes, "pair"), Some(format)) {
         pairs.flatten().for_each(|found| pair(&found));
     }
 }
