@@ -41,10 +41,16 @@ pub trait Float<T>:
     /// A truth value for each problem.
     type Mask: Mask;
 
-    /// `self · b + c`.
-    fn mul_add(self, b: Self, c: Self) -> Self;
-    /// `c − self · b`.
-    fn neg_mul_add(self, b: Self, c: Self) -> Self;
+    /// `self · b + c`, rounded once where the instructions have that.
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        self * b + c
+    }
+    /// `c − self · b`, likewise.
+    #[inline(always)]
+    fn neg_mul_add(self, b: Self, c: Self) -> Self {
+        c - self * b
+    }
     /// The square root.
     fn sqrt(self) -> Self;
     /// `1/√` of a positive number, to rounding, which in `f32` may be 5e-6 of it; of others anything.

@@ -56,16 +56,6 @@ macro_rules! lanes {
             type Mask = $Mask;
 
             #[inline(always)]
-            fn mul_add(self, b: Self, c: Self) -> Self {
-                self * b + c
-            }
-
-            #[inline(always)]
-            fn neg_mul_add(self, b: Self, c: Self) -> Self {
-                c - self * b
-            }
-
-            #[inline(always)]
             fn sqrt(self) -> Self {
                 Self(self.1.$sqrt(self.0), self.1)
             }

@@ -32,16 +32,6 @@ impl Float<f64> for Two {
     type Mask = Self;
 
     #[inline(always)]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        self * b + c
-    }
-
-    #[inline(always)]
-    fn neg_mul_add(self, b: Self, c: Self) -> Self {
-        c - self * b
-    }
-
-    #[inline(always)]
     fn sqrt(self) -> Self {
         Self::sqrt(self)
     }

@@ -22,6 +22,7 @@
 use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6};
 
 use crate::robust::conclude::evidence::{Explained, Likelihood, without_two};
+use crate::robust::conclude::length::{FARTHEST, UNKNOWN};
 use crate::robust::data::point_transfer::Displacement;
 
 /// Polynomials of two variables up to the fourth degree, but for the constant.
@@ -41,7 +42,7 @@ const FACTOR: f64 = 0.5;
 
 /// The field is constant beyond this many deviations from the middle of the points, where polynomials would grow. Points that are
 /// uniform in the image end at 1.73.
-const FARTHEST: f64 = 1.8;
+const EDGE: f64 = 1.8;
 
 /// The least spread of the inverse depths, squared.
 const LEAST_SPREAD: f64 = 1e-8;
@@ -65,12 +66,6 @@ const FREE: f64 = 4.0;
 
 /// A step may lower the likelihood by so many nats: one that is longer than that of EM overshoots a little near the limit.
 const LOST: f64 = 1.0;
-
-/// A point counts as at most so many times as far away as most: one at infinity says nothing of a scene.
-const FARTHEST_POINT: f64 = 5.0;
-
-/// Which points are near is known to this share of them.
-const UNKNOWN: f64 = 0.5;
 
 /// This share of the diagonal is added to the normal equations, which are singular without a translation: the field moves no point.
 const RIDGE: f64 = 1e-9;
@@ -169,7 +164,7 @@ fn degrees() -> impl Iterator<Item = [usize; 2]> {
 
 /// Products of Hermite polynomials of mean zero and unit variance.
 fn polynomials(at: Vector2<f64>) -> Field {
-    let powers = at.map(|x| x.clamp(-FARTHEST, FARTHEST));
+    let powers = at.map(|x| x.clamp(-EDGE, EDGE));
     let hermite = [powers.x, powers.y].map(|x| {
         let square = x * x;
         [
@@ -274,7 +269,7 @@ impl DepthField {
             let placed = self.place(d, terms, likelihood, index);
             let Explained { usual, near, .. } = placed.explained;
             let variance = self.square_spread * (1.0 - placed.share);
-            let rho = placed.rho().max(variance.sqrt()).max(1.0 / FARTHEST_POINT);
+            let rho = placed.rho().max(variance.sqrt()).max(1.0 / FARTHEST);
             let square = if rho > placed.rho() { 2.0 } else { variance / (rho * rho) };
             sum += usual * (1.0 + square.min(1.0)) / rho + near / placed.depth.max(1.0);
             unknown += usual * square / rho;

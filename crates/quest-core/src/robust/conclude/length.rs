@@ -26,12 +26,12 @@ const WELL: f64 = 2.0;
 /// More points are in front of the cameras than behind by so many standard deviations of a vote by chance.
 const BY_CHANCE: f64 = 2.0;
 
-/// The mean depth of points that are too far away to be clear is known to this share of it, as is the mean depth of points in units of
-/// the median inverse depth where depths differ.
-const UNKNOWN: f64 = 0.5;
+/// The mean depth of points that are too far away to be clear is known to this share of it, as are the mean depth of points in units of
+/// the median inverse depth where depths differ, and which points are near.
+pub(crate) const UNKNOWN: f64 = 0.5;
 
 /// A point that is too far away to be clear counts as at most so many times as far away as most: one at infinity says nothing of a scene.
-const FARTHEST: f64 = 5.0;
+pub(crate) const FARTHEST: f64 = 5.0;
 
 /// The share of depths that must stand clear.
 const MOST: f64 = 0.9;
