@@ -6,6 +6,7 @@
 
 pub(crate) mod abreast;
 pub(crate) mod columns;
+pub(crate) mod exponential;
 pub(crate) mod geometry;
 pub(crate) mod instructions;
 pub(crate) mod lane;

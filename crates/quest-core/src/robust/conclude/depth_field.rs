@@ -19,16 +19,16 @@
 //! Each round holds the variances, takes the expected share of each explanation of each match, and makes a Gauss–Newton step of
 //! the rotation, the translation and the field together.
 
-use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 
-use crate::robust::conclude::evidence::{Explained, Likelihood, without_two};
-use crate::robust::conclude::length::{FARTHEST, UNKNOWN};
-use crate::robust::data::point_transfer::Displacement;
+use crate::algebra::vectors::widest::{Simd, Work, add_product, widest};
+use crate::robust::conclude::evidence::{Explained, Likelihood, Places, without_two};
+use crate::robust::data::point_transfer::{Block, Lanes, WIDTH, Whitened, rows, whitened};
 
 /// Polynomials of two variables up to the fourth degree, but for the constant.
-const TERMS: usize = 14;
+pub(crate) const TERMS: usize = 14;
 const DEGREE: usize = 4;
-const PARAMETERS: usize = 6 + TERMS;
+pub(crate) const PARAMETERS: usize = 6 + TERMS;
 
 /// The deviation of a coefficient of the first degree; its square halves with each further degree. A corridor that is twice as near
 /// at its sides as in the middle has 0.3.
@@ -67,12 +67,17 @@ const FREE: f64 = 4.0;
 /// A step may lower the likelihood by so many nats: one that is longer than that of EM overshoots a little near the limit.
 const LOST: f64 = 1.0;
 
+/// A fit is at its end when its step gains about this many nats. That step is made.
+const NEGLIGIBLE: f64 = 0.01;
+
 /// This share of the diagonal is added to the normal equations, which are singular without a translation: the field moves no point.
 const RIDGE: f64 = 1e-9;
 
-pub(crate) type Field = SVector<f64, TERMS>;
-type Parameters = SVector<f64, PARAMETERS>;
-type Equations = SMatrix<f64, PARAMETERS, PARAMETERS>;
+/// The polynomials at the points of a few matches.
+pub(crate) type Terms = [Lanes; TERMS];
+type Field = SVector<f64, TERMS>;
+pub(crate) type Parameters = SVector<f64, PARAMETERS>;
+pub(crate) type Equations = SMatrix<f64, PARAMETERS, PARAMETERS>;
 type Factor = nalgebra::Cholesky<f64, nalgebra::Const<PARAMETERS>>;
 
 /// Where a fit begins and what it finds.
@@ -83,54 +88,50 @@ pub(crate) struct DepthField {
     pub(crate) t_21: Vector3<f64>,
     field: Field,
     /// `s²`.
-    square_spread: f64,
-    near: f64,
+    pub(crate) square_spread: f64,
+    pub(crate) near: f64,
 }
 
-/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of `(ω, t_21)`.
+/// The logarithm of the likelihood over that without a translation, in nats, and the covariance of all parameters: the turn, the
+/// translation and the field.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) at: DepthField,
     pub(crate) nats: f64,
-    pub(crate) covariance: Matrix6<f64>,
-    /// The mean depth in the unit of the translation, and the covariance with the translation in units of the mean depth.
-    pub(crate) mean_depth: f64,
-    pub(crate) covariance_by_depth: Matrix6<f64>,
+    pub(crate) covariance: Equations,
 }
 
-/// A match under a motion with a field of depths.
-struct Placed {
-    /// By how much the match moves along its epipolar line, by a unit of inverse depth, and in which direction.
-    length: f64,
-    u: [f64; 2],
-    /// What the field says of its inverse depth, and what the match says.
-    mean: f64,
-    depth: f64,
-    across: f64,
-    away: f64,
-    /// The part of what the match says in what is known of its inverse depth.
-    share: f64,
-    explained: Explained,
+/// A few matches under a motion with a field of depths.
+pub(crate) struct Placed {
+    /// By how much they move along their epipolar lines, by a unit of inverse depth, and in which direction.
+    length: Lanes,
+    pub(crate) inverse_length: Lanes,
+    u: [Lanes; 2],
+    /// What the field says of their inverse depths, and what the matches say.
+    pub(crate) mean: Lanes,
+    pub(crate) depth: Lanes,
+    across: Lanes,
+    away: Lanes,
+    /// The part of what the matches say in what is known of their inverse depths.
+    pub(crate) share: Lanes,
+    /// By how much they move along their epipolar lines with a turn and with a translation.
+    pub(crate) by_turn: [Lanes; 3],
+    pub(crate) by_unit: [Lanes; 3],
+    pub(crate) explained: Explained,
 }
 
 impl Placed {
-    /// The inverse depth that the match is likeliest to have, as a point of the field.
-    fn rho(&self) -> f64 {
-        self.mean + self.share * (self.depth - self.mean)
+    /// The inverse depth that match `j` is likeliest to have, as a point of the field.
+    #[inline(always)]
+    pub(crate) fn rho(&self, j: usize) -> f64 {
+        self.mean[j] + self.share[j] * (self.depth[j] - self.mean[j])
     }
-}
-
-/// The mean depth, its derivative by the parameters, and the variance of what no match says of it.
-struct MeanDepth {
-    value: f64,
-    slope: Parameters,
-    variance: f64,
 }
 
 /// What a round sums up.
 struct Sums {
-    /// Of what lies across the epipolar lines, and of what lies along them.
-    across: Equations,
+    /// Of what lies across the epipolar lines, which no depth changes, and of what lies along them.
+    across: Matrix6<f64>,
     along: Equations,
     gradient: Parameters,
     usual: f64,
@@ -142,19 +143,34 @@ struct Sums {
 }
 
 /// The polynomials at the points of the matches of a likelihood.
-pub(crate) fn terms(likelihood: &Likelihood, still: &UnitQuaternion<f64>) -> Vec<Field> {
-    let at: Vec<Vector2<f64>> = likelihood.displacements(still).iter().map(place).collect();
-    let count = at.len().max(1) as f64;
-    let mean = at.iter().sum::<Vector2<f64>>() / count;
-    let square = at.iter().map(|p| (p - mean).component_mul(&(p - mean))).sum::<Vector2<f64>>() / count;
-    let scale = square.map(|square| 1.0 / square.sqrt().max(1e-9));
-    at.iter().map(|p| polynomials((p - mean).component_mul(&scale))).collect()
+pub(crate) fn terms(likelihood: &Likelihood) -> Vec<Terms> {
+    let places: Vec<[Lanes; 2]> = likelihood.blocks().iter().map(place).collect();
+    let count = likelihood.len().max(1) as f64;
+    let axis = |k: usize| {
+        let each = || places.iter().flat_map(move |place| place[k]).take(likelihood.len());
+        let mean = each().sum::<f64>() / count;
+        let square = each().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+        (mean, 1.0 / square.sqrt().max(1e-9))
+    };
+    let axes = [axis(0), axis(1)];
+    let of_block = |place: &[Lanes; 2]| {
+        let mut terms = [[0.0; WIDTH]; TERMS];
+        for j in 0..WIDTH {
+            let at = [0, 1].map(|k| (place[k][j] - axes[k].0) * axes[k].1);
+            for (lanes, term) in terms.iter_mut().zip(polynomials(at)) {
+                lanes[j] = term;
+            }
+        }
+        terms
+    };
+    places.iter().map(of_block).collect()
 }
 
-/// Where the point is seen in view 1, in the plane.
-fn place(d: &Displacement) -> Vector2<f64> {
-    let depth = if d.x1.z.abs() > 1e-3 { d.x1.z } else { 1e-3 };
-    d.x1.xy() / depth
+/// Where the points are seen in view 1, in the plane.
+fn place(block: &Block) -> [Lanes; 2] {
+    let [x, y, z] = &block.x1;
+    let depth = z.map(|z| if z.abs() > 1e-3 { z } else { 1e-3 });
+    [x, y].map(|x| std::array::from_fn(|j| x[j] / depth[j]))
 }
 
 /// The degree of each term.
@@ -163,9 +179,9 @@ fn degrees() -> impl Iterator<Item = [usize; 2]> {
 }
 
 /// Products of Hermite polynomials of mean zero and unit variance.
-fn polynomials(at: Vector2<f64>) -> Field {
-    let powers = at.map(|x| x.clamp(-EDGE, EDGE));
-    let hermite = [powers.x, powers.y].map(|x| {
+fn polynomials(at: [f64; 2]) -> impl Iterator<Item = f64> {
+    let hermite = at.map(|x| {
+        let x = x.clamp(-EDGE, EDGE);
         let square = x * x;
         [
             1.0,
@@ -175,7 +191,7 @@ fn polynomials(at: Vector2<f64>) -> Field {
             ((square - 6.0) * square + 3.0) / 24_f64.sqrt(),
         ]
     });
-    Field::from_iterator(degrees().map(|[i, j]| hermite[0][i] * hermite[1][j]))
+    degrees().map(move |[i, j]| hermite[0][i] * hermite[1][j])
 }
 
 /// `1/gj²`.
@@ -213,11 +229,12 @@ impl DepthField {
     ///
     /// A step that lowers the likelihood is halved: behind the translation without length lies the one of the opposite sign,
     /// which puts near points behind the cameras.
-    pub(crate) fn fit(mut self, terms: &[Field], likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
+    pub(crate) fn fit(mut self, terms: &[Terms], likelihood: &Likelihood, rounds: usize) -> Option<Fit> {
         let precisions = precisions();
         let (mut sums, mut from) = (self.round(terms, likelihood), None);
         for _ in 0..rounds {
             let worth = self.worth(&sums, &precisions);
+            let mut gain = f64::INFINITY;
             match from.take() {
                 Some((before, step, before_worth)) if worth < before_worth - LOST => {
                     let step: Parameters = step * 0.5;
@@ -228,68 +245,25 @@ impl DepthField {
                     let factor = regularised(&sums, &precisions)?;
                     let step = self.step(&sums, &precisions, &factor)?;
                     let next = Self::stepped(&self, &step).with_shares(&sums, &factor);
+                    let spread = (next.square_spread / self.square_spread).ln();
+                    gain =
+                        0.5 * factor.l().tr_mul(&step).norm_squared() + 0.25 * sums.usual * spread * spread;
                     from = Some((std::mem::replace(&mut self, next), step, worth));
                 }
             }
             sums = self.round(terms, likelihood);
+            if gain < NEGLIGIBLE {
+                break;
+            }
         }
         if let Some((before, ..)) = from.filter(|from| self.worth(&sums, &precisions) < from.2 - LOST) {
             self = before;
             sums = self.round(terms, likelihood);
         }
-        let all = regularised(&sums, &precisions)?.inverse();
-        let covariance: Matrix6<f64> = all.fixed_view::<6, 6>(0, 0).into_owned();
-        let depth = self.mean_depth(terms, likelihood)?;
-        let by_depth = self.by_depth(&depth);
-        let mut covariance_by_depth = by_depth * all * by_depth.transpose();
-        let mut block = covariance_by_depth.fixed_view_mut::<3, 3>(3, 3);
-        block += self.t_21 * self.t_21.transpose() * (depth.variance / depth.value.powi(4));
-        let nats = without_two(sums.nats) - self.surprise(&precisions);
-        let is_finite =
-            nats.is_finite() && covariance_by_depth.iter().chain(&covariance).all(|x| x.is_finite());
-        is_finite.then_some(Fit { at: self, nats, covariance, mean_depth: depth.value, covariance_by_depth })
-    }
-
-    /// The derivative of the pose, with its translation in units of the mean depth, by all parameters.
-    fn by_depth(&self, depth: &MeanDepth) -> SMatrix<f64, 6, PARAMETERS> {
-        let mut derivative = SMatrix::<f64, 6, PARAMETERS>::identity();
-        derivative.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(1.0 / depth.value);
-        let mut of_length = derivative.fixed_view_mut::<3, PARAMETERS>(3, 0);
-        of_length -= self.t_21 * depth.slope.transpose() / (depth.value * depth.value);
-        derivative
-    }
-
-    /// The mean depth of the points of the field and of near points. The mean of `1/ρ`, of a normal variable with the mean `m` and the
-    /// variance `v`, is `(1 + v/m²)/m` to second order; of depths whose logarithms are normal it is that exactly. Depths of
-    /// other shapes have about `(v/m²)²` more or less.
-    fn mean_depth(&self, terms: &[Field], likelihood: &Likelihood) -> Option<MeanDepth> {
-        let (mut sum, mut weights, mut slope) = (0.0, 0.0, Parameters::zeros());
-        let (mut unknown, mut of_each) = (0.0, 0.0);
-        for (index, (d, terms)) in likelihood.displacements(&self.q_21).iter().zip(terms).enumerate() {
-            let placed = self.place(d, terms, likelihood, index);
-            let Explained { usual, near, .. } = placed.explained;
-            let variance = self.square_spread * (1.0 - placed.share);
-            let rho = placed.rho().max(variance.sqrt()).max(1.0 / FARTHEST);
-            let square = if rho > placed.rho() { 2.0 } else { variance / (rho * rho) };
-            sum += usual * (1.0 + square.min(1.0)) / rho + near / placed.depth.max(1.0);
-            unknown += usual * square / rho;
-            of_each += usual * square / (rho * rho);
-            weights += usual + near;
-            let by_rho = -usual * (1.0 + 3.0 * square) / (rho * rho);
-            let [turn, unit] = [turn(d), d.slope].map(|v| v[0] * placed.u[0] + v[1] * placed.u[1]);
-            let by_match = by_rho * placed.share / placed.length;
-            let mut head = slope.fixed_rows_mut::<3>(0);
-            head -= turn * by_match;
-            let mut head = slope.fixed_rows_mut::<3>(3);
-            head -= unit * (by_match * placed.depth);
-            let mut tail = slope.fixed_rows_mut::<TERMS>(6);
-            tail += terms * (by_rho * (1.0 - placed.share));
-        }
-        (weights > 0.0).then(|| MeanDepth {
-            value: sum / weights,
-            slope: slope / weights,
-            variance: (UNKNOWN * (unknown / weights + self.near)).powi(2) + of_each / (weights * weights),
-        })
+        let covariance = regularised(&sums, &precisions)?.inverse();
+        let nats = without_two(&sums.nats) - self.surprise(&precisions);
+        let is_finite = nats.is_finite() && covariance.iter().all(|x| x.is_finite());
+        is_finite.then_some(Fit { at: self, nats, covariance })
     }
 
     /// The logarithm of the likelihood and of what is known of the field before any match is seen, which the rounds increase.
@@ -351,89 +325,195 @@ impl DepthField {
         self
     }
 
-    fn round(&self, terms: &[Field], likelihood: &Likelihood) -> Sums {
-        let mut sums = Sums {
-            across: Equations::zeros(),
-            along: Equations::zeros(),
-            gradient: Parameters::zeros(),
-            usual: 0.0,
-            near: 0.0,
-            square_spread: 0.0,
-            share: 0.0,
-            nats: Vec::with_capacity(terms.len()),
-        };
-        let all = likelihood.displacements(&self.q_21);
-        for (index, (d, terms)) in all.iter().zip(terms).enumerate() {
-            self.add(&mut sums, d, terms, likelihood, index);
-        }
-        sums
+    fn round(&self, terms: &[Terms], likelihood: &Likelihood) -> Sums {
+        widest(Round { at: self, r_21: self.rows(), terms, likelihood })
     }
 
-    /// Where a match is.
-    fn place(&self, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) -> Placed {
-        let b = [0, 1].map(|k| d.slope[k].dot(&self.t_21));
-        let length = b[0].hypot(b[1]).max(LEAST_LENGTH);
-        // Without a translation any two directions do.
-        let u = if length > LEAST_LENGTH { b.map(|x| x / length) } else { [1.0, 0.0] };
-        let mean = 1.0 + terms.dot(&self.field);
-        let across = d.residual[0] * u[1] - d.residual[1] * u[0];
-        let along = -(d.residual[0] * u[0] + d.residual[1] * u[1]);
-        let away = mean * length - along;
-        let spread = self.square_spread * length * length;
-        let share = spread / (likelihood.variance() + spread);
-        let explained = likelihood.explain(index, [across, away], along, spread, self.near, d.is_in_front);
-        Placed { length, u, mean, depth: along / length, across, away, share, explained }
+    /// The rotation as the kernels take it.
+    pub(crate) fn rows(&self) -> [f64; 9] {
+        rows(&self.q_21.to_rotation_matrix().into_inner())
     }
 
-    /// Adds what a match says.
-    fn add(&self, sums: &mut Sums, d: &Displacement, terms: &Field, likelihood: &Likelihood, index: usize) {
-        let placed = self.place(d, terms, likelihood, index);
-        let Placed { length, u, mean, depth, across, away, share, .. } = placed;
-        let Explained {
-            usual,
-            near,
-            across: across_weight,
-            near_across: near_weight,
-            along: along_weight,
-            nats,
-        } = placed.explained;
-        sums.nats.push(nats);
-        sums.usual += usual;
-        sums.near += near;
-        if across_weight <= 0.0 {
-            return;
+    /// Where the matches of a block are.
+    #[inline(always)]
+    pub(crate) fn place(&self, w: &Whitened, terms: &Terms, likelihood: &Likelihood, block: usize) -> Placed {
+        let [mut length, mut inverse_length, mut mean, mut depth, mut share] = [[0.0; WIDTH]; 5];
+        let mut u = [[0.0; WIDTH]; 2];
+        let [mut by_turn, mut by_unit] = [[[0.0; WIDTH]; 3]; 2];
+        let zero = [0.0; WIDTH];
+        let mut at =
+            Places { across: zero, away: zero, along: zero, spread: zero, is_in_front: w.is_in_front };
+        for (terms, coefficient) in terms.iter().zip(&self.field) {
+            for j in 0..WIDTH {
+                mean[j] += terms[j] * coefficient;
+            }
         }
-        let deviation = placed.rho() - mean;
-        sums.share += usual * share;
-        sums.square_spread +=
-            usual * (deviation * deviation + share * likelihood.variance() / (length * length));
-        let turn = turn(d);
-        let side = [turn, d.slope].map(|v| v[0] * u[1] - v[1] * u[0]);
-        // The lever of a near point is its own depth.
-        for (weight, rho) in [(across_weight - near_weight, placed.rho()), (near_weight, depth)] {
-            let [by_turn, by_unit] = side;
-            let row = Vector6::from_fn(|k, _| if k < 3 { by_turn[k] } else { by_unit[k - 3] * rho });
-            sums.across.fixed_view_mut::<6, 6>(0, 0).ger(weight, &row, &row, 1.0);
-            let mut head = sums.gradient.fixed_rows_mut::<6>(0);
-            head += row * (weight * across);
+        let variance = likelihood.variance();
+        for j in 0..WIDTH {
+            let unit = |s: &[Lanes; 3]| s[0][j] * self.t_21.x + s[1][j] * self.t_21.y + s[2][j] * self.t_21.z;
+            let b = [unit(&w.slope[0]), unit(&w.slope[1])];
+            let norm = (b[0] * b[0] + b[1] * b[1]).sqrt();
+            let is_long = norm > LEAST_LENGTH;
+            let norm = if is_long { norm } else { LEAST_LENGTH };
+            let inverse = 1.0 / norm;
+            // Without a translation any two directions do.
+            let (u0, u1) = if is_long { (b[0] * inverse, b[1] * inverse) } else { (1.0, 0.0) };
+            let along = -(w.residual[0][j] * u0 + w.residual[1][j] * u1);
+            mean[j] += 1.0;
+            length[j] = norm;
+            depth[j] = along * inverse;
+            inverse_length[j] = inverse;
+            at.across[j] = w.residual[0][j] * u1 - w.residual[1][j] * u0;
+            at.along[j] = along;
+            at.away[j] = mean[j] * norm - along;
+            at.spread[j] = self.square_spread * norm * norm;
+            share[j] = at.spread[j] / (variance + at.spread[j]);
+            u[0][j] = u0;
+            u[1][j] = u1;
+            let slope = [0, 1, 2].map(|k| w.slope[0][k][j] * u0 + w.slope[1][k][j] * u1);
+            let y = [w.y[0][j], w.y[1][j], w.y[2][j]];
+            for (k, turn) in cross(y, slope).into_iter().enumerate() {
+                by_turn[k][j] = turn;
+                by_unit[k][j] = slope[k];
+            }
         }
-        let mut row = Parameters::zeros();
-        row.fixed_rows_mut::<3>(0).copy_from(&(turn[0] * u[0] + turn[1] * u[1]));
-        row.fixed_rows_mut::<3>(3).copy_from(&((d.slope[0] * u[0] + d.slope[1] * u[1]) * mean));
-        row.fixed_rows_mut::<TERMS>(6).copy_from(&(terms * length));
-        sums.along.ger(along_weight, &row, &row, 1.0);
-        sums.gradient += row * (along_weight * away);
+        let explained = likelihood.explain(block, &at, self.near);
+        let Places { across, away, .. } = at;
+        Placed { length, inverse_length, u, mean, depth, across, away, share, by_turn, by_unit, explained }
     }
 }
 
-/// By how much a match moves with a turn.
-fn turn(d: &Displacement) -> [Vector3<f64>; 2] {
-    d.slope.map(|slope| d.y.cross(&slope))
+#[inline(always)]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Entries of the upper triangles of symmetric matrices.
+const POSE_ENTRIES: usize = 6 * 7 / 2;
+const ENTRIES: usize = PARAMETERS * (PARAMETERS + 1) / 2;
+
+/// The sums of a round over all matches.
+struct Round<'a> {
+    at: &'a DepthField,
+    r_21: [f64; 9],
+    terms: &'a [Terms],
+    likelihood: &'a Likelihood,
+}
+
+impl Work for Round<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Sums {
+        let Self { at, r_21, terms, likelihood } = self;
+        let variance = likelihood.variance();
+        let mut along = [[0.0; WIDTH]; ENTRIES];
+        let mut across = [[0.0; WIDTH]; POSE_ENTRIES];
+        let mut gradient = [[0.0; WIDTH]; PARAMETERS];
+        let [mut usual, mut near, mut square_spread, mut share] = [[0.0; WIDTH]; 4];
+        let mut nats = Vec::with_capacity(terms.len());
+        for (index, (block, terms)) in likelihood.blocks().iter().zip(terms).enumerate() {
+            let w = whitened(&r_21, block);
+            let placed = at.place(&w, terms, likelihood, index);
+            let of_block = &placed.explained;
+            let mut row = [[0.0; WIDTH]; PARAMETERS];
+            let mut weight = [0.0; WIDTH];
+            // Across the lines: the derivatives of points of the field and of near points, whose lever is their own depth, differ by
+            // the inverse depth in those by the translation.
+            let mut side = [[0.0; WIDTH]; 6];
+            let mut weights = [[0.0; WIDTH]; 3];
+            let mut of_block_nats = [0.0; WIDTH];
+            for j in 0..WIDTH {
+                let live = if block.is_live[j] { 1.0 } else { 0.0 };
+                of_block_nats[j] = live * of_block.nats[j];
+                let (rho, own) = (placed.rho(j), placed.depth[j]);
+                let deviation = rho - placed.mean[j];
+                let inverse = placed.inverse_length[j];
+                let usual_share = live * of_block.usual[j];
+                usual[j] += usual_share;
+                near[j] += live * of_block.near[j];
+                share[j] += usual_share * placed.share[j];
+                square_spread[j] +=
+                    usual_share * (deviation * deviation + placed.share[j] * variance * inverse * inverse);
+                let of_near = live * of_block.near_across[j];
+                let of_field = live * of_block.across[j] - of_near;
+                weights[0][j] = of_field + of_near;
+                weights[1][j] = of_field * rho + of_near * own;
+                weights[2][j] = of_field * rho * rho + of_near * own * own;
+                weight[j] = live * of_block.along[j];
+                let (u0, u1) = (placed.u[0][j], placed.u[1][j]);
+                let slope = [0, 1, 2].map(|k| w.slope[0][k][j] * u1 - w.slope[1][k][j] * u0);
+                let turn = cross([w.y[0][j], w.y[1][j], w.y[2][j]], slope);
+                for k in 0..3 {
+                    side[k][j] = turn[k];
+                    side[k + 3][j] = slope[k];
+                    row[k][j] = placed.by_turn[k][j];
+                    row[k + 3][j] = placed.by_unit[k][j] * placed.mean[j];
+                }
+            }
+            nats.push(of_block_nats);
+            for (row, terms) in row[6..].iter_mut().zip(terms) {
+                for j in 0..WIDTH {
+                    row[j] = terms[j] * placed.length[j];
+                }
+            }
+            let mut entry = 0;
+            for a in 0..6 {
+                // By the squares of the inverse depth that the two derivatives have.
+                let weighted = [0, 1].map(|k| times(&side[a], &weights[k + usize::from(a > 2)]));
+                add_product(simd, &mut gradient[a], &weighted[0], &placed.across);
+                for b in a..6 {
+                    add_product(simd, &mut across[entry], &weighted[usize::from(b > 2)], &side[b]);
+                    entry += 1;
+                }
+            }
+            let mut entry = 0;
+            for a in 0..PARAMETERS {
+                let weighted = times(&row[a], &weight);
+                add_product(simd, &mut gradient[a], &weighted, &placed.away);
+                for row in &row[a..] {
+                    add_product(simd, &mut along[entry], &weighted, row);
+                    entry += 1;
+                }
+            }
+        }
+        let sum = |lanes: &Lanes| lanes.iter().sum::<f64>();
+        let [usual, near, square_spread, share] =
+            [usual, near, square_spread, share].map(|lanes| sum(&lanes));
+        Sums {
+            across: symmetric(&across.map(|lanes| sum(&lanes))),
+            along: symmetric(&along.map(|lanes| sum(&lanes))),
+            gradient: Parameters::from_fn(|k, _| sum(&gradient[k])),
+            usual,
+            near,
+            square_spread,
+            share,
+            nats: nats.into_flattened(),
+        }
+    }
+}
+
+#[inline(always)]
+fn times(a: &Lanes, b: &Lanes) -> Lanes {
+    std::array::from_fn(|j| a[j] * b[j])
+}
+
+/// A symmetric matrix by the rows of its upper triangle.
+fn symmetric<const N: usize>(upper: &[f64]) -> SMatrix<f64, N, N> {
+    let mut matrix = SMatrix::zeros();
+    let entries = (0..N).flat_map(|a| (a..N).map(move |b| (a, b)));
+    for ((a, b), &entry) in entries.zip(upper) {
+        matrix[(a, b)] = entry;
+        matrix[(b, a)] = entry;
+    }
+    matrix
 }
 
 /// The normal equations with what is known of the field before any match is seen, factored.
 fn regularised(sums: &Sums, precisions: &Field) -> Option<Factor> {
-    let mut equations = sums.across + sums.along;
+    let mut equations = sums.along;
+    let mut pose = equations.fixed_view_mut::<6, 6>(0, 0);
+    pose += sums.across;
     for (k, precision) in precisions.iter().enumerate() {
         equations[(6 + k, 6 + k)] += precision;
     }

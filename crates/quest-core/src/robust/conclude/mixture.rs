@@ -12,8 +12,8 @@
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
-use crate::robust::conclude::depth_field::Fit;
 use crate::robust::conclude::length::Length;
+use crate::robust::conclude::mean_depth::Mode;
 use crate::robust::conclude::rotation_alone::NOT_A_ROTATION;
 use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;
@@ -64,7 +64,7 @@ pub(crate) fn mixture(
         let turn = (q_21 * small.q_21.inverse()).scaled_axis();
         Vector6::from_fn(|k, _| if k < 3 { turn[k] } else { t_21[k - 3] })
     };
-    let mut components: Vec<Component> = small.modes.iter().map(|fit| of_mode(fit, &after)).collect();
+    let mut components: Vec<Component> = small.modes.iter().map(|mode| of_mode(mode, &after)).collect();
     if components.is_empty() {
         components.extend(general().map(|(pose, covariance)| Component {
             nats: small.nats,
@@ -101,15 +101,15 @@ fn in_unit(covariance: &Matrix6<f64>, scale: f64) -> Matrix6<f64> {
 
 /// A mode, with its translation in units of the mean depth. Noise across a translation makes it longer: its square grows by the
 /// variance across it.
-fn of_mode(fit: &Fit, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vector6<f64>) -> Component {
-    let square = fit.at.t_21.norm_squared().max(f64::MIN_POSITIVE);
-    let block = fit.covariance.fixed_view::<3, 3>(3, 3).into_owned();
-    let along = fit.at.t_21.dot(&(block * fit.at.t_21)) / square;
+fn of_mode(mode: &Mode, after: &impl Fn(&UnitQuaternion<f64>, Vector3<f64>) -> Vector6<f64>) -> Component {
+    let square = mode.at.t_21.norm_squared().max(f64::MIN_POSITIVE);
+    let block = mode.covariance.fixed_view::<3, 3>(3, 3).into_owned();
+    let along = mode.at.t_21.dot(&(block * mode.at.t_21)) / square;
     let direction = ((block.trace() - along) / square).clamp(0.0, 1.0);
-    let scale = 1.0 / fit.mean_depth;
-    let t_21 = fit.at.t_21 * (scale * (1.0 - 0.5 * direction));
-    let covariance = fit.covariance_by_depth * (1.0 + CURVED * direction);
-    Component { nats: fit.nats, mean: after(&fit.at.q_21, t_21), covariance }
+    let scale = 1.0 / mode.mean_depth;
+    let t_21 = mode.at.t_21 * (scale * (1.0 - 0.5 * direction));
+    let covariance = mode.covariance_by_depth * (1.0 + CURVED * direction);
+    Component { nats: mode.nats, mean: after(&mode.at.q_21, t_21), covariance }
 }
 
 /// The same with the best rotation alone and the translation that is the likeliest with it. As long as no translation is evident,

@@ -5,12 +5,15 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::conclude::alternatives::Alternative;
-use crate::robust::conclude::depth_field::{self, DepthField, Fit};
+use crate::robust::conclude::depth_field::{self, DepthField, Fit, Terms};
 use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
+use crate::robust::conclude::mean_depth::Mode;
 use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, median_root, rotation_alone};
 use crate::robust::data::observations::Observations;
+use crate::robust::data::point_transfer::{Displacement, Lanes, WIDTH};
 use crate::robust::refine::epipolar::{FINE, Subset, refine};
 use crate::robust::search::pose_score::PoseScorer;
 use crate::robust::search::search_score::MANY;
@@ -118,7 +121,7 @@ pub(crate) struct SmallMotion {
     /// Matches that may be true.
     pub(crate) is_likely: Vec<bool>,
     /// The poses that explain the matches, the likeliest first.
-    pub(crate) modes: Vec<Fit>,
+    pub(crate) modes: Vec<Mode>,
 }
 
 impl SmallMotion {
@@ -146,7 +149,7 @@ impl SmallMotion {
     }
 
     /// The modes that are nearly as likely as the likeliest.
-    pub(crate) fn likely(&self) -> impl Iterator<Item = &Fit> {
+    pub(crate) fn likely(&self) -> impl Iterator<Item = &Mode> {
         let most = self.modes.first().map_or(0.0, |mode| mode.nats);
         self.modes.iter().filter(move |mode| mode.nats > most - AS_LIKELY)
     }
@@ -218,11 +221,10 @@ fn modes(
     least_depth: f64,
     of_some: &Likelihood,
     of_many: &Likelihood,
-) -> Vec<Fit> {
-    let fitted = |starts: Vec<DepthField>, likelihood: &Likelihood, rounds: usize, most: usize| {
-        let terms = depth_field::terms(likelihood, q_21);
+) -> Vec<Mode> {
+    let fitted = |starts: Vec<DepthField>, (likelihood, terms): (&Likelihood, &[Terms]), rounds, most| {
         let mut fits: Vec<Fit> =
-            starts.into_iter().filter_map(|start| start.fit(&terms, likelihood, rounds)).collect();
+            starts.into_iter().filter_map(|start| start.fit(terms, likelihood, rounds)).collect();
         fits.sort_by(|a, b| b.nats.total_cmp(&a.nats));
         let mut distinct: Vec<Fit> = Vec::new();
         for fit in fits {
@@ -245,9 +247,12 @@ fn modes(
         let t_21 = minimum.motion.direction * minimum.mean_depth.max(least_depth);
         DepthField::start(minimum.motion.q_21, t_21, USUAL)
     }));
-    let good = ends(fitted(starts, of_some, GLIMPSE_ROUNDS, GOOD_STARTS));
-    let explored = ends(likely(fitted(good, of_some, EXPLORING_ROUNDS, MODES), UNLIKELY_OF_SOME));
-    likely(fitted(explored, of_many, FIELD_ROUNDS, MODES), UNLIKELY)
+    let terms = [of_some, of_many].map(depth_field::terms);
+    let (some, many) = ((of_some, &terms[0][..]), (of_many, &terms[1][..]));
+    let good = ends(fitted(starts, some, GLIMPSE_ROUNDS, GOOD_STARTS));
+    let explored = ends(likely(fitted(good, some, EXPLORING_ROUNDS, MODES), UNLIKELY_OF_SOME));
+    let found = likely(fitted(explored, many, FIELD_ROUNDS, MODES), UNLIKELY);
+    found.into_iter().filter_map(|fit| Mode::new(fit, many.1, many.0)).collect()
 }
 
 /// The likeliest minima whose directions differ.
@@ -373,29 +378,65 @@ fn direction_of_pairs(
     // A translation `t` moves a point by `slope · t`: across the displacement it does not move it.
     let across: Vec<Vector3<f64>> =
         off.iter().map(|d| d.slope[0] * d.residual[1] - d.slope[1] * d.residual[0]).collect();
-    let (mut most, mut best) = (2, None);
+    let (mut most, mut best) = (2.0, None);
     let count = off.len();
+    let blocks: Vec<Off> = off.chunks(WIDTH).map(Off::new).collect();
     let pairs = (1..count).flat_map(|gap| (0..count - gap).map(move |i| (i, i + gap))).take(PAIRS);
     for (i, j) in pairs {
         let Some(direction) = across[i].cross(&across[j]).try_normalize(1e-12) else { continue };
-        let sides = off.iter().map(|d| {
-            let b = [d.slope[0].dot(&direction), d.slope[1].dot(&direction)];
-            let length = b[0].hypot(b[1]).max(1e-12);
-            let is_near = (d.residual[0] * b[1] - d.residual[1] * b[0]).abs() < WITHIN * sigma * length;
-            let along = -(d.residual[0] * b[0] + d.residual[1] * b[1]);
-            if is_near { along.signum() } else { 0.0 }
-        });
-        let (mut plus, mut minus) = (0, 0);
-        for side in sides {
-            plus += usize::from(side > 0.0);
-            minus += usize::from(side < 0.0);
-        }
+        let [plus, minus] = widest(Sides { blocks: &blocks, direction: direction.into(), sigma });
         if plus.max(minus) > most {
             most = plus.max(minus);
             best = Some(if plus >= minus { direction } else { -direction });
         }
     }
     best
+}
+
+/// A few matches that a rotation does not explain; those that fill up have no displacement.
+struct Off {
+    residual: [Lanes; 2],
+    slope: [[Lanes; 3]; 2],
+}
+
+impl Off {
+    fn new(some: &[Displacement]) -> Self {
+        let of =
+            |value: &dyn Fn(&Displacement) -> f64| std::array::from_fn(|j| some.get(j).map_or(0.0, value));
+        Self {
+            residual: [0, 1].map(|k| of(&|d| d.residual[k])),
+            slope: [0, 1].map(|k| [0, 1, 2].map(|i| of(&|d| d.slope[k][i]))),
+        }
+    }
+}
+
+/// How many matches a translation in a direction takes along their epipolar lines, and how many one against it.
+struct Sides<'a> {
+    blocks: &'a [Off],
+    direction: [f64; 3],
+    sigma: f64,
+}
+
+impl Work for Sides<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> [f64; 2] {
+        let Self { blocks, direction: [x, y, z], sigma } = self;
+        let limit = (WITHIN * sigma).powi(2);
+        let mut counts = [[0.0; WIDTH]; 2];
+        for Off { residual, slope } in blocks {
+            for j in 0..WIDTH {
+                let b = [0, 1].map(|k| slope[k][0][j] * x + slope[k][1][j] * y + slope[k][2][j] * z);
+                let away = residual[0][j] * b[1] - residual[1][j] * b[0];
+                let along = -(residual[0][j] * b[0] + residual[1][j] * b[1]);
+                let is_near = away * away < limit * (b[0] * b[0] + b[1] * b[1]);
+                counts[0][j] += if is_near & (along > 0.0) { 1.0 } else { 0.0 };
+                counts[1][j] += if is_near & (along < 0.0) { 1.0 } else { 0.0 };
+            }
+        }
+        counts.map(|lanes| lanes.iter().sum())
+    }
 }
 
 /// Refines a pose over the matches that are more likely true than false, which then are its inliers: where the parallax is

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::data::image::Image;
 use crate::solver::shared::motion::Motion;
 
@@ -178,7 +178,7 @@ impl Work for Filling<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _: S) {
         if self.columns.is_sphere() {
             self.view.fill::<true>(self.columns, self.out);
         } else {

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::data::image::FramedMatch;
 
 /// Matches that are worked on at once.
@@ -68,12 +68,8 @@ impl Framed {
 pub(crate) struct Displacement {
     /// Two numbers of unit noise for noise of one pixel.
     pub(crate) residual: [f64; 2],
-    /// Their derivatives by `y`.
+    /// Their derivatives by the point of view 1 after the rotation.
     pub(crate) slope: [Vector3<f64>; 2],
-    /// The point of view 1 after the rotation.
-    pub(crate) y: Vector3<f64>,
-    /// The point of view 1.
-    pub(crate) x1: Vector3<f64>,
     pub(crate) is_in_front: bool,
 }
 
@@ -84,12 +80,9 @@ impl Framed {
         let of_block = |block: &Block| {
             let w = whitened(&r_21, block);
             let vector = |v: &[Lanes; 3], j: usize| Vector3::new(v[0][j], v[1][j], v[2][j]);
-            let x1 = block.x1;
             (0..WIDTH).map(move |j| Displacement {
                 residual: [w.residual[0][j], w.residual[1][j]],
                 slope: [vector(&w.slope[0], j), vector(&w.slope[1], j)],
-                y: vector(&w.y, j),
-                x1: vector(&x1, j),
                 is_in_front: w.is_in_front[j],
             })
         };
@@ -127,7 +120,7 @@ impl Work for SquareErrors<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _: S) {
         for (block, out) in self.matches.blocks.iter().zip(self.out) {
             let Whitened { residual: [r, s], is_in_front, .. } = whitened(&self.h, block);
             for j in 0..WIDTH {

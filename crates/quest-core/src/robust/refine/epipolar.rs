@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Matrix5, Vector5};
 
 use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::robust::data::columns::Columns;
 use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
@@ -179,7 +179,7 @@ impl<L: RobustLoss> Work for Accumulation<'_, L> {
     type Output = Equations;
 
     #[inline(always)]
-    fn run(self) -> Equations {
+    fn run<S: Simd>(self, _: S) -> Equations {
         let Self { subset, f, df, loss } = self;
         if subset.is_sphere {
             subset.accumulate::<true>(&f, &df, &loss)

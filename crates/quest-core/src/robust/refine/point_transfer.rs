@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::data::point_transfer::{Framed, Lanes, WIDTH, rows, whitened};
 use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
 
@@ -72,7 +72,7 @@ impl<const P: usize, L: RobustLoss, R: Parameters<P>> Work for Accumulation<'_, 
     type Output = Equations<P>;
 
     #[inline(always)]
-    fn run(self) -> Equations<P> {
+    fn run<S: Simd>(self, _: S) -> Equations<P> {
         let Self { matches, h, loss, parameters } = self;
         let behind = loss.cost_and_weight(f64::MAX.sqrt()).0;
         let mut cost = [0.0; WIDTH];

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::lanes::{SearchScore, WithLoss};
 use crate::robust::data::columns::{POSES, Residuals, is_in_front};
 use crate::robust::data::observations::Observations;
@@ -171,7 +171,7 @@ impl Work for Judging<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> f64 {
+    fn run<S: Simd>(self, _: S) -> f64 {
         self.loss.run(self)
     }
 }

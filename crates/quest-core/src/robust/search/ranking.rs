@@ -17,7 +17,7 @@
 //!
 //! The idea that true matches keep their neighbours is that of GMS (J. Bian et al., *GMS: Grid-based Motion Statistics*, CVPR 2017).
 
-use crate::algebra::vectors::widest::{Work, widest};
+use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::search::chart::Chart;
 
 /// Followers on a snake that a match is compared with. On recorded pairs diluted to 3 % the samples that the best pool
@@ -153,7 +153,7 @@ impl Work for Turn<'_> {
 
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
-    fn run(self) -> [f32; 2] {
+    fn run<S: Simd>(self, _: S) -> [f32; 2] {
         let n = self.along[0].len();
         let mut sums = [[0.0_f32; LANES]; 2];
         for o in 1..=NEAR.min(n - 1) {
@@ -189,7 +189,7 @@ impl Work for Pairs<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<S: Simd>(self, _: S) {
         let Self { along, area, turn: [cosine, sine], sums } = self;
         let n = sums.len();
         let scale = SHARE * area / std::f32::consts::PI;
