@@ -219,6 +219,7 @@ impl Densities {
 
     /// How likely each explanation of a few matches is; `near_share` is the share of near points.
     #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn explain(&self, still: &Lanes, at: &Places, near_share: f64) -> Explained {
         let zero = [0.0; WIDTH];
         let mut out =
@@ -451,6 +452,7 @@ impl Work for Probabilities<'_> {
     type Output = [Vec<Lanes>; 2];
 
     #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn run<S: Simd>(self, _: S) -> [Vec<Lanes>; 2] {
         let Self { likelihood: Likelihood { still, densities, .. }, all, depths } = self;
         let [mut is_true, mut nats] = [Vec::with_capacity(all.len()), Vec::with_capacity(all.len())];

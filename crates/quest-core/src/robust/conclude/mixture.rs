@@ -12,8 +12,8 @@
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
+use crate::robust::conclude::depth_field::Mode;
 use crate::robust::conclude::length::Length;
-use crate::robust::conclude::mean_depth::Mode;
 use crate::robust::conclude::rotation_alone::NOT_A_ROTATION;
 use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::observations::Observations;

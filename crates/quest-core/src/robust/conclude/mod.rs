@@ -11,7 +11,6 @@ pub(crate) mod false_alarms;
 mod final_refinement;
 mod inverse_depth;
 mod length;
-mod mean_depth;
 mod mixture;
 mod model;
 mod plane;

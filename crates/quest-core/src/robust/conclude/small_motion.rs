@@ -7,10 +7,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::conclude::alternatives::Alternative;
-use crate::robust::conclude::depth_field::{self, DepthField, Fit, Terms};
+use crate::robust::conclude::depth_field::{self, DepthField, Fit, Mode, Terms};
 use crate::robust::conclude::evidence::{Evidence, Likelihood, ROUNDS};
 use crate::robust::conclude::final_refinement::{FEWEST, Polished};
-use crate::robust::conclude::mean_depth::Mode;
 use crate::robust::conclude::rotation_alone::{NOT_A_ROTATION, excess, median_root, rotation_alone};
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::{Displacement, Lanes, WIDTH};
@@ -421,6 +420,7 @@ impl Work for Sides<'_> {
     type Output = [f64; 2];
 
     #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn run<S: Simd>(self, _: S) -> [f64; 2] {
         let Self { blocks, direction: [x, y, z], sigma } = self;
         let limit = (WITHIN * sigma).powi(2);

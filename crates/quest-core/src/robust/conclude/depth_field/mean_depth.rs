@@ -3,10 +3,12 @@
 
 use nalgebra::{Matrix6, SMatrix};
 
-use crate::robust::conclude::depth_field::{DepthField, Fit, PARAMETERS, Parameters, TERMS, Terms};
+use crate::robust::conclude::depth_field::field::{DepthField, PARAMETERS, Parameters, TERMS, Terms};
+use crate::robust::conclude::depth_field::fit::Fit;
+use crate::robust::conclude::depth_field::sums::Placed;
 use crate::robust::conclude::evidence::Likelihood;
 use crate::robust::conclude::length::{FARTHEST, UNKNOWN};
-use crate::robust::data::point_transfer::{WIDTH, whitened};
+use crate::robust::data::point_transfer::{WIDTH, rows, whitened};
 
 /// A fit with the mean depth of its points.
 #[derive(Clone, Debug)]
@@ -58,9 +60,9 @@ fn by_depth(at: &DepthField, depth: &MeanDepth) -> SMatrix<f64, 6, PARAMETERS> {
 fn mean_depth(at: &DepthField, terms: &[Terms], likelihood: &Likelihood) -> Option<MeanDepth> {
     let (mut sum, mut weights, mut slope) = (0.0, 0.0, Parameters::zeros());
     let (mut unknown, mut of_each) = (0.0, 0.0);
-    let r_21 = at.rows();
+    let r_21 = rows(&at.q_21.to_rotation_matrix().into_inner());
     for (index, (block, terms)) in likelihood.blocks().iter().zip(terms).enumerate() {
-        let placed = at.place(&whitened(&r_21, block), terms, likelihood, index);
+        let placed = Placed::new(at, &whitened(&r_21, block), terms, likelihood, index);
         for j in (0..WIDTH).filter(|&j| block.is_live[j]) {
             let (usual, near) = (placed.explained.usual[j], placed.explained.near[j]);
             let share = placed.share[j];
