@@ -68,6 +68,7 @@ pub(crate) fn solve(
     if let Err(degeneracy) = found {
         return out.set_degeneracy(degeneracy);
     }
+    shortlist.keep_motions_of_five(matches);
     write(kinds, &mut shortlist, &alignment, |q0_21| translation_direction(q0_21, matches), matches, out);
 }
 

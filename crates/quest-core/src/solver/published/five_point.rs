@@ -68,6 +68,7 @@ pub(crate) fn solve(
     if !solved {
         return out.set_degeneracy(Degeneracy::RankDeficient);
     }
+    solutions.shortlist.keep_motions_of_five(matches);
     solutions.shortlist.write(kinds, matches, out);
 }
 

@@ -56,6 +56,11 @@ pub(crate) struct Item {
 }
 
 impl Item {
+    /// How many motions it stands for.
+    fn motions(&self) -> usize {
+        1 + usize::from(self.is_pair)
+    }
+
     /// Whether the essential matrix or the one motion of `other` is here as well.
     #[inline]
     fn covers(&self, other: &Self, tolerance: f64) -> bool {
@@ -93,7 +98,7 @@ impl Shortlist {
 
     /// How many motions there are of a kind.
     pub(crate) fn count(&self, kind: CandidateKind) -> usize {
-        self.iter().filter(|item| item.kind == kind).map(|item| 1 + usize::from(item.is_pair)).sum()
+        self.iter().filter(|item| item.kind == kind).map(Item::motions).sum()
     }
 
     /// Drops all but one kind.
@@ -241,9 +246,25 @@ impl Shortlist {
             let costs = self.iter().map(|item| gram.cost(&item.motion));
             let worst = costs.enumerate().max_by(|(_, x), (_, y)| x.total_cmp(y));
             let Some((worst, _)) = worst else { return };
-            self.items.copy_within(worst + 1..self.len, worst);
-            self.len -= 1;
+            self.remove(worst);
         }
+    }
+
+    /// Drops what is beyond the motions that five matches may have, two of each of ten essential matrices: those that fit worst.
+    /// Degenerate matches have endlessly many, of which every basis of the null space shows others.
+    pub(crate) fn keep_motions_of_five(&mut self, matches: &[Correspondence]) {
+        const MOST: usize = 20;
+        while 2 * self.len > MOST && self.iter().map(Item::motions).sum::<usize>() > MOST {
+            let costs = self.iter().map(|item| item.motion.truncated_cost(matches, f64::INFINITY));
+            let worst = costs.enumerate().max_by(|(_, x), (_, y)| x.total_cmp(y));
+            let Some((worst, _)) = worst else { return };
+            self.remove(worst);
+        }
+    }
+
+    fn remove(&mut self, place: usize) {
+        self.items.copy_within(place + 1..self.len, place);
+        self.len -= 1;
     }
 
     /// Those whose costs are not too far above the smallest, the best first.
