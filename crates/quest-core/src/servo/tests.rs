@@ -1,5 +1,6 @@
 //! The closed loop.
 
+mod controller;
 mod hostile;
 mod laboratory;
 
