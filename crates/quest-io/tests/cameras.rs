@@ -215,7 +215,23 @@ fn what_is_no_calibration_says_what_it_is() {
     let k = |matrix: &str| refused("a.yaml", format!("K: [{matrix}]\n"), None);
     assert_eq!(k("1, 2"), "a.yaml: K: found 2 numbers, expected the 9 of a matrix");
     assert_eq!(k("1, 0, 2, 0, x, 4, 0, 0, 1"), "a.yaml: K: found \"x\", expected a finite number");
-    assert!(k("1, 9, 2, 0, 3, 4, 0, 0, 1").ends_with("expected fx, 0, cx, 0, fy, cy, 0, 0, 1"));
+    for matrix in [
+        "1, 9, 2, 0, 3, 4, 0, 0, 1",
+        "1, 0, 2, 9, 3, 4, 0, 0, 1",
+        "1, 0, 2, 0, 3, 4, 9, 0, 1",
+        "1, 0, 2, 0, 3, 4, 0, 9, 1",
+        "1, 0, 2, 0, 3, 4, 0, 0, 2",
+    ] {
+        assert!(k(matrix).ends_with("expected fx, 0, cx, 0, fy, cy, 0, 0, 1"), "{matrix}");
+    }
+    let three = refused("a.yaml", "K: [1, 0, 2, 0, 3, 4, 0, 0, 1]\nimage_size: [640, x]\n", None);
+    assert_eq!(three, "a.yaml: image_size: found \"x\", expected pixels");
+    let three = refused("a.yaml", "K: [1, 0, 2, 0, 3, 4, 0, 0, 1]\nimage_size: [640]\n", None);
+    assert_eq!(three, "a.yaml: image_size: found one of width and height, expected both or none");
+    let fisheye = refused("a.yaml", "K: [1, 0, 2, 0, 3, 4, 0, 0, 1]\nfisheye: maybe\n", None);
+    assert_eq!(fisheye, "a.yaml: fisheye: found \"maybe\", expected 0 or 1");
+    let none = read("a.yaml", "K: [1, 0, 2, 0, 3, 4, 0, 0, 1]\nimage_width: 0\nimage_height: 0\n", None);
+    assert_eq!(none.unwrap(), camera("PINHOLE", None, &[1.0, 3.0, 2.0, 4.0]).unwrap());
     let focal = k("0, 0, 2, 0, 3, 4, 0, 0, 1");
     assert!(focal.starts_with("a.yaml: K: focal length fx of the camera is 0 pixels"), "{focal}");
     let three = ROS.replace("MODEL", "plumb_bob").replace(", 0.004]", "]");

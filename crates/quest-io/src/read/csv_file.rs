@@ -65,9 +65,11 @@ pub(super) fn parse<const N: usize>(
     Ok(rows)
 }
 
-/// What separates the fields of the first line that is not blank.
+/// What separates the fields of the first line that is neither blank nor a comment.
 fn separator(text: &str) -> u8 {
-    let line = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default().trim();
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let first = lines.clone().next().unwrap_or_default();
+    let line = lines.find(|line| !line.starts_with(COMMENT)).unwrap_or(first);
     // A comma beside one of the others is a decimal comma, which is refused with the field it stands in.
     b";\t,".iter().copied().find(|&s| line.as_bytes().contains(&s)).unwrap_or(b' ')
 }
