@@ -35,25 +35,25 @@ impl Defaults for OfEstimate {
     }
 }
 
-/// The options of a search.
+/// The options of a search. Their defaults are strings: `default_value_t` keeps the first one that is asked for, whatever `D` is.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct EstimateOptions<D: Defaults> {
     #[arg(long, value_name = "PX", allow_negative_numbers = true, help = D::THRESHOLD)]
     pub(crate) threshold: Option<f64>,
     /// How sure to be that a sample without outliers was seen.
-    #[arg(long, value_name = "P", allow_negative_numbers = true, default_value_t = D::options().confidence)]
+    #[arg(long, value_name = "P", allow_negative_numbers = true, default_value = D::options().confidence.to_string())]
     confidence: f64,
     /// Draw at least this many samples.
-    #[arg(long, value_name = "N", default_value_t = D::options().min_iterations)]
+    #[arg(long, value_name = "N", default_value = D::options().min_iterations.to_string())]
     min_iterations: usize,
     /// Draw at most this many samples.
-    #[arg(long, value_name = "N", default_value_t = D::options().max_iterations)]
+    #[arg(long, value_name = "N", default_value = D::options().max_iterations.to_string())]
     max_iterations: usize,
     /// Answer if at most this many poses as good as the best one are expected where all matches are false; `inf` answers always.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = D::options().max_false_alarms)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value = D::options().max_false_alarms.to_string())]
     max_false_alarms: f64,
     /// The seed of the samples.
-    #[arg(long, value_name = "S", default_value_t = D::options().seed)]
+    #[arg(long, value_name = "S", default_value = D::options().seed.to_string())]
     seed: u64,
     /// The solver of the samples; `quest-cli solvers` describes them.
     #[arg(long, value_name = "NAME", default_value = D::options().solver.info().name, value_parser = solver_parser())]

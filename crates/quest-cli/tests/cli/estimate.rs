@@ -295,6 +295,25 @@ fn every_search_takes_the_same_options() {
     }
 }
 
+/// The options are one text with other defaults: those of COLMAP are 10,000 samples and a confidence of 0.999.
+#[test]
+fn every_search_has_its_own_defaults() {
+    let default_of = |arguments: &[&str], option: &str| -> String {
+        let help = run(arguments).stdout;
+        let (_, after) = help.split_once(option).expect(option);
+        let (_, default) = after.split_once("[default: ").expect("a default");
+        default.split(']').next().unwrap_or_default().to_owned()
+    };
+    assert_eq!(default_of(&["estimate", "--help"], "--max-iterations"), "100000");
+    assert_eq!(default_of(&["estimate", "--help"], "--confidence"), "0.9999");
+    if cfg!(feature = "colmap") {
+        for command in ["verify", "export"] {
+            assert_eq!(default_of(&["colmap", command, "--help"], "--max-iterations"), "10000");
+            assert_eq!(default_of(&["colmap", command, "--help"], "--confidence"), "0.999");
+        }
+    }
+}
+
 #[test]
 fn at_least_and_at_most_so_many_samples_are_drawn() {
     let pair = pair([0.5, 0.1, -0.2], 90, false);

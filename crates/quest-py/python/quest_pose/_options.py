@@ -16,7 +16,7 @@ class EstimateOptions(TypedDict, total=False):
     confidence : float
         How sure to be that a sample without outliers was seen before the search stops: 0.9999 by default.
     min_iterations : int
-        At least this many samples are drawn: 300 by default.
+        At least this many samples are drawn: 100 by default.
     max_iterations : int
         At most this many samples are drawn: 100,000 by default.
     max_false_alarms : float

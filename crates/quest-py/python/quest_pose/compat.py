@@ -154,7 +154,7 @@ def find_essential_mat(
     try:
         found = estimate(
             u1, u2, k, threshold=threshold, confidence=prob, max_iterations=max(maxIters, 1),
-            min_iterations=min(300, max(maxIters, 1)),
+            min_iterations=min(100, max(maxIters, 1)),
         )  # fmt: skip
     except NoAnswer:
         return None, None

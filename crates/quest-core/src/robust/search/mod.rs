@@ -43,6 +43,9 @@ const BLOCK: usize = 32;
 const UNRANKED: usize = 40;
 const RANKED_PER_SAMPLE: usize = 7;
 
+/// So many samples are drawn without an order, however small it makes the number of those that are needed.
+const WITHOUT_ORDER: usize = 300;
+
 /// The stopping rule counts matches up to this multiple of the threshold. At the threshold itself, a pose that is not refined to the
 /// end would look worse than it is, and the search would go on for nothing.
 const SUPPORT: f64 = 1.5;
@@ -202,9 +205,9 @@ impl<'a> Search<'a> {
             self.look_at(source, &mut round);
             self.learn(&mut guide, &round, draws.size);
             enough = self.enough(&mut guide, limits, is_chance);
-            // What a few samples more would end is not worth an order, nor what the least number ends.
-            let is_long = enough - self.iterations.min(enough) > matches / RANKED_PER_SAMPLE
-                && enough > limits.min_iterations;
+            // What a few samples more would end is not worth an order.
+            let is_long =
+                enough - self.iterations.min(enough) > matches / RANKED_PER_SAMPLE && enough > WITHOUT_ORDER;
             if self.iterations >= UNRANKED && is_long && !guide.is_ranked() && !guide.is_too_small() {
                 guide.rank(chart(self.observations), None);
                 enough = self.enough(&mut guide, limits, is_chance);
