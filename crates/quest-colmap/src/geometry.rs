@@ -101,25 +101,19 @@ impl TwoViewGeometry {
         let direction = pose.t_21.try_normalize(0.0).filter(|_| model != Model::PureRotation);
         let Some(direction) = direction else {
             let pose = RelativePose::new(pose.q_21, Vector3::zeros());
-            let homography = ks.and_then(|ks| of_pixels(&pose.r_21(), ks));
+            let homography = ks.and_then(|ks| homography(Model::PureRotation, &pose, rays, ks));
             let inliers = turned_alone(&pose, rays, inliers);
             return Self { homography, pose: Some(pose), ..Self::of_pixels(Config::Panoramic, inliers) };
         };
         let pose = RelativePose::new(pose.q_21, direction);
         let essential = pose.essential();
-        let (config, homography) = match model {
-            Model::Planar => {
-                let plane = normal(&pose, rays).map(|n| pose.r_21() + direction * n.transpose());
-                (Config::Planar, plane.zip(ks).and_then(|(h, ks)| of_pixels(&h, ks)))
-            }
-            _ => (Config::Calibrated, None),
-        };
+        let config = if model == Model::Planar { Config::Planar } else { Config::Calibrated };
         let of_pixels =
             |[k1, k2]: [Matrix3<f64>; 2]| Some(k2.try_inverse()?.transpose() * essential * k1.try_inverse()?);
         Self {
             fundamental: ks.and_then(of_pixels),
             essential: Some(essential),
-            homography,
+            homography: ks.and_then(|ks| homography(model, &pose, rays, ks)),
             pose: Some(pose),
             ..Self::of_pixels(config, inliers)
         }
@@ -133,6 +127,25 @@ pub(crate) fn calibrations(cameras: [&Camera; 2]) -> Option<[Matrix3<f64>; 2]> {
         (!camera.model().is_fisheye()).then(|| Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))
     };
     Some([k(cameras[0])?, k(cameras[1])?])
+}
+
+/// What takes the pixels of a plane, or of all points where the camera turns in place, to those of the other image; `None` of points in
+/// space.
+pub(crate) fn homography(
+    model: Model,
+    pose: &RelativePose,
+    rays: &[Correspondence],
+    ks: [Matrix3<f64>; 2],
+) -> Option<Matrix3<f64>> {
+    let of_rays = match model {
+        Model::PureRotation => pose.r_21(),
+        Model::Planar => {
+            let pose = RelativePose::new(pose.q_21, pose.t_21.try_normalize(0.0)?);
+            pose.r_21() + pose.t_21 * normal(&pose, rays)?.transpose()
+        }
+        _ => return None,
+    };
+    of_pixels(&of_rays, ks)
 }
 
 /// `K2 H K1⁻¹`.

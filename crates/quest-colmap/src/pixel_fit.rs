@@ -11,6 +11,9 @@ pub(crate) type PixelMatch = [Vector2<f64>; 2];
 /// Rounds of fitting and of choosing the inliers again.
 const ROUNDS: usize = 6;
 
+/// A homography that is not fitted to the pixels yet may be off by so many thresholds.
+const NEAR: f64 = 4.0;
+
 /// A matrix that fits pixels, and which of them are its inliers.
 pub(crate) struct Fitted {
     pub(crate) matrix: Matrix3<f64>,
@@ -24,6 +27,18 @@ pub(crate) enum Kind {
     Fundamental,
     /// `x2 ∝ H x1`.
     Homography,
+}
+
+/// The inliers that are near where a homography takes them: the inliers of a pose are on their epipolar lines, false ones too, and one of
+/// these is far from where a plane is seen.
+pub(crate) fn near(
+    homography: &Matrix3<f64>,
+    matches: &[PixelMatch],
+    inliers: &[bool],
+    threshold: f64,
+) -> Vec<bool> {
+    let is_near = |m: &PixelMatch| Kind::Homography.error(homography, m) < NEAR * threshold;
+    matches.iter().zip(inliers).map(|(m, is_inlier)| *is_inlier && is_near(m)).collect()
 }
 
 /// Fits all matches that are within `threshold` pixels, beginning with those of `start`.
@@ -183,5 +198,17 @@ mod tests {
             let false_found = (0..200).filter(|i| i % 5 == 0 && found.inliers[*i]).count();
             assert!(false_found <= 6, "{kind:?} {false_found}");
         }
+    }
+
+    /// One match in five is false and counts as an inlier of the pose: together they would draw the fit off the plane.
+    #[test]
+    fn false_inliers_of_a_pose_are_far_from_its_plane() {
+        let (matches, start) = scene(0.0);
+        let plane = fit(Kind::Homography, &matches, &start, 4.0).unwrap().matrix;
+        let rough = plane * Matrix3::new(1.0, 0.0, 6.0, 0.0, 1.0, -4.0, 0.0, 0.0, 1.0);
+        let near = near(&rough, &matches, &[true; 200], 4.0);
+        let found = fit(Kind::Homography, &matches, &near, 4.0).unwrap();
+        assert_eq!((0..200).filter(|i| i % 5 != 0 && found.inliers[*i]).count(), 160);
+        assert_eq!((0..200).filter(|i| i % 5 == 0 && near[*i]).count(), 0);
     }
 }

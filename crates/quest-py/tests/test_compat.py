@@ -113,6 +113,21 @@ def test_gtsfm(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (R, t, len(verified), ratio) == (None, None, 0, 0.0)
 
 
+def test_glue_factorys_loader_takes_the_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes the classes of a module that belong there and are estimators."""
+    base = type("BaseEstimator", (), {})
+    fake(monkeypatch, "torch")
+    for name in ("gluefactory", "gluefactory.geometry", "gluefactory.robust_estimators"):
+        fake(monkeypatch, name)
+    fake(monkeypatch, "gluefactory.geometry.wrappers", Pose=object)
+    fake(monkeypatch, "gluefactory.robust_estimators.base_estimator", BaseEstimator=base)
+    module = ModuleType("gluefactory.robust_estimators.relative_pose.quest")
+    exec("from quest_pose import compat\nQuestRelativePoseEstimator = compat.gluefactory_estimator()", vars(module))
+    classes = [c for c in vars(module).values() if isinstance(c, type) and issubclass(c, base)]
+    found = [c for c in classes if c.__module__ == module.__name__]
+    assert [c.__name__ for c in found] == ["QuestRelativePoseEstimator"]
+
+
 def test_glue_factory_and_gtsam_are_needed_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("gluefactory", "torch", "gtsam"):
         monkeypatch.setitem(sys.modules, name, None)

@@ -8,7 +8,7 @@ use quest_core::robust::{self, Estimate, EstimateError, Model, Options, Priors};
 use quest_core::{Camera, Correspondence};
 
 use super::{Found, Uncalibrated, VerifyOptions};
-use crate::geometry::calibrations;
+use crate::geometry::{calibrations, homography};
 use crate::image::Rays;
 use crate::pixel_fit::{self, Kind, PixelMatch};
 use crate::report::PairReport;
@@ -154,6 +154,14 @@ impl Usable {
     }
 }
 
+/// The matches that are inliers.
+fn chosen<'a>(
+    matches: &'a [Correspondence],
+    inliers: &'a [bool],
+) -> impl Iterator<Item = Correspondence> + 'a {
+    matches.iter().zip(inliers).filter(|(_, is_inlier)| **is_inlier).map(|(m, _)| *m)
+}
+
 impl Input {
     fn rays(&self) -> Result<[&Rays; 2], String> {
         let [first, second] = self.images.each_ref().map(|image| image.as_ref().as_ref());
@@ -187,8 +195,7 @@ impl Input {
             return Ok(TwoViewGeometry::of_pixels(Config::Watermark, inliers));
         }
         if self.is_calibrated || options.uncalibrated == Uncalibrated::Skip {
-            let flags = usable.matches.iter().zip(&estimate.inliers);
-            let rays: Vec<_> = flags.filter(|(_, is_inlier)| **is_inlier).map(|(m, _)| *m).collect();
+            let rays: Vec<_> = chosen(&usable.matches, &estimate.inliers).collect();
             return Ok(TwoViewGeometry::calibrated(estimate.model, &estimate.pose, &rays, inliers, cameras));
         }
         self.uncalibrated(usable, estimate, options)
@@ -235,7 +242,12 @@ impl Input {
             Model::Planar | Model::PureRotation => (Kind::Homography, Config::PlanarOrPanoramic),
             _ => (Kind::Fundamental, Config::Uncalibrated),
         };
-        let fitted = pixel_fit::fit(kind, &pixels, &estimate.inliers, options.search.threshold)
+        let rays: Vec<_> = chosen(&usable.matches, &estimate.inliers).collect();
+        let start = match homography(estimate.model, &estimate.pose, &rays, [k1, k2]) {
+            Some(plane) => pixel_fit::near(&plane, &pixels, &estimate.inliers, options.search.threshold),
+            None => estimate.inliers.clone(),
+        };
+        let fitted = pixel_fit::fit(kind, &pixels, &start, options.search.threshold)
             .ok_or("no matrix fits the pixels of the inliers")?;
         let places = usable.chosen(&fitted.inliers);
         self.check(places.len(), options)?;

@@ -8,6 +8,7 @@ pose the identity), and a camera that only turned has ``t = 0`` in ``poselib`` a
 results have no other.
 """
 
+import sys
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -217,7 +218,8 @@ def gluefactory_estimator() -> type:
     Returns
     -------
     type
-        A subclass of its ``BaseEstimator``, with the configuration ``ransac_th``, in pixels, and ``options`` of ``estimate``.
+        A subclass of its ``BaseEstimator``, with the configuration ``ransac_th``, in pixels, and ``options`` of ``estimate``. It
+        belongs to the module that asks for it, since glue-factory's loader takes no class of another one.
 
     Raises
     ------
@@ -250,6 +252,7 @@ def gluefactory_estimator() -> type:
             R, t = (torch.from_numpy(x).to(points[0]) for x in (found.R, _direction(found)))
             return {"success": True, "M_0to1": Pose.from_Rt(R, t), "inliers": torch.from_numpy(found.inliers)}
 
+    QuestRelativePoseEstimator.__module__ = sys._getframe(1).f_globals["__name__"]
     return QuestRelativePoseEstimator
 
 
