@@ -3,7 +3,7 @@
 //! R. Hartley, *In defence of the eight-point algorithm*, IEEE TPAMI 19(6), 1997; each equation is divided by the length of its
 //! gradient, as found in the round before, which makes its residual the Sampson error.
 
-use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 
 /// Pixels of a match in both images.
 pub(crate) type PixelMatch = [Vector2<f64>; 2];
@@ -127,12 +127,13 @@ impl Kind {
             Self::Fundamental => 1.0 / gradient2(matrix, m).max(f64::MIN_POSITIVE),
             Self::Homography => {
                 let z = (matrix * m[0].push(1.0)).z;
-                1.0 / (z * z).max(f64::MIN_POSITIVE)
+                2.0 / (z * z * transferred(matrix, m).1.trace()).max(f64::MIN_POSITIVE)
             }
         }
     }
 
-    /// The Sampson error of `F`, or the distance to the transferred point by `H`, in pixels.
+    /// The Sampson error of `F`, or the distance to the point that `H` transfers in units of what noise of one pixel in both images makes of it:
+    /// a plane that is seen from aside in image 1 makes the noise of that larger.
     fn error(self, matrix: &Matrix3<f64>, m: &PixelMatch) -> f64 {
         let (x1, x2) = (m[0].push(1.0), m[1].push(1.0));
         match self {
@@ -140,11 +141,20 @@ impl Kind {
                 x2.dot(&(matrix * x1)).abs() / gradient2(matrix, m).max(f64::MIN_POSITIVE).sqrt()
             }
             Self::Homography => {
-                let y = matrix * x1;
-                (y.xy() / y.z - m[1]).norm()
+                let (off, noise) = transferred(matrix, m);
+                noise.try_inverse().map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)).max(0.0).sqrt())
             }
         }
     }
+}
+
+/// How far the transferred point is from the match, and the covariance of that where both images have noise of one pixel: `I + A Aᵀ` with
+/// the derivative `A` of the transfer.
+fn transferred(h: &Matrix3<f64>, m: &PixelMatch) -> (Vector2<f64>, Matrix2<f64>) {
+    let y = h * m[0].push(1.0);
+    let at = y.xy() / y.z;
+    let slope = (h.fixed_view::<2, 2>(0, 0) - at * h.fixed_view::<1, 2>(2, 0)) / y.z;
+    (at - m[1], Matrix2::identity() + slope * slope.transpose())
 }
 
 fn gradient2(f: &Matrix3<f64>, m: &PixelMatch) -> f64 {
