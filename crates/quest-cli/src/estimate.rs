@@ -35,6 +35,7 @@ Examples:
   quest-cli estimate pairs.jsonl -o results.jsonl
   quest-cli estimate 'pairs/*.npz' --camera1 PINHOLE,640,480,500,500,320,240 -o results.jsonl
   quest-cli estimate pairs.jsonl -o results.jsonl --resume     after it was ended
+  quest-cli estimate pairs.parquet -o poses.parquet            built with --features parquet
   quest-cli estimate views12.json --third views13.json
 
 Files are those of `quest-cli solve`, whose help describes them; several of them, folders and patterns are
@@ -126,14 +127,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut tally = Tally::after(there);
     let numbered = (arguments.first_index..).map_while(|index| {
         let pair = pairs.next().transpose()?;
-        Some((index, pair.map_err(|error| pairs.alone(error))))
+        // The key of the file seeds the search, where it has one.
+        let key = match &pair {
+            Ok(pair) => pair.key,
+            Err(error) => error.key,
+        };
+        Some((key.unwrap_or(index), pair.map_err(|error| pairs.alone(error))))
     });
     let done = in_order(
         arguments.threads,
         numbered.skip(there),
         |(index, pair): (u64, Result<Pair, Result<Unread, ReadError>>)| match pair {
             Ok(pair) => one_pair(arguments, index, &pair, is_several),
-            Err(Ok(unread)) => Ok(Estimated::unreadable(unread)),
+            Err(Ok(unread)) => Ok(Estimated::unreadable(index, unread)),
             Err(Err(error)) => Err(error.into()),
         },
         |estimated: Result<Estimated, Failure>| {
@@ -157,9 +163,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 impl Estimated {
     /// A line or a file that is no pair.
-    fn unreadable(Unread { name, error }: Unread) -> Self {
+    fn unreadable(key: u64, Unread { name, error }: Unread) -> Self {
         let heading = words::one_line(&format!("{}: no pose", error.place));
-        let record = EstimateRecord::unanswered(name, error.to_string());
+        let record = EstimateRecord { key, ..EstimateRecord::unanswered(name, error.to_string()) };
         Self { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)) }
     }
 }
@@ -194,7 +200,7 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) ->
     let usable = pair.usable();
     let options = match arguments.options(pair, index) {
         Err(error) if is_several => {
-            return Ok(Estimated::unreadable(Unread { name: pair.name.clone(), error }));
+            return Ok(Estimated::unreadable(index, Unread { name: pair.name.clone(), error }));
         }
         options => options?,
     };
@@ -220,7 +226,8 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) ->
             (EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms), Some(error.to_string()))
         }
     };
-    let record = EstimateRecord { invalid_count: usable.invalid.len(), ..record };
+    let (invalid_count, match_count) = (usable.invalid.len(), pair.matches.len());
+    let record = EstimateRecord { key: index, match_count, invalid_count, ..record };
     let name = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
     let heading = words::one_line(&format!("{name}: {} matches{}", pair.matches.len(), summary(&record)));
     let refusal = reason.map(|reason| Refusal::NoPose(format!("{}: {reason}", pair.place)));
@@ -283,5 +290,9 @@ impl Record for EstimateRecord {
 
     fn write_csv(&self, writer: &mut dyn Write, pair: usize) -> io::Result<()> {
         rows::write_estimate(writer, pair, self)
+    }
+
+    fn as_estimate(&self) -> Option<&EstimateRecord> {
+        Some(self)
     }
 }

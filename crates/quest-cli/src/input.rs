@@ -40,7 +40,7 @@ pub(crate) struct ReadingOptions {
 /// Where one pair comes from.
 #[derive(Args, Debug)]
 pub(crate) struct InputOptions {
-    /// The file of matches: .json, .jsonl, .csv, .npy or .npz; `-` is standard input.
+    /// The file of matches: .json, .jsonl, .csv, .npy, .npz or .parquet; `-` is standard input.
     file: PathBuf,
     #[command(flatten)]
     reading: ReadingOptions,
@@ -49,8 +49,8 @@ pub(crate) struct InputOptions {
 /// Where pairs come from.
 #[derive(Args, Debug)]
 pub(crate) struct InputsOptions {
-    /// The files of matches, .json, .jsonl, .csv, .npy or .npz, folders of them, or patterns such as 'pairs/*.npz'; `-` is standard
-    /// input.
+    /// The files of matches, .json, .jsonl, .csv, .npy, .npz or .parquet, folders of them, or patterns such as 'pairs/*.npz'; `-` is
+    /// standard input.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -137,8 +137,7 @@ impl ReadingOptions {
 
     /// The pairs of one file.
     fn input(&self, opened: Opened, quiet: bool) -> Input<'_> {
-        let is_lines =
-            matches!(&opened, Opened::Pairs(pairs) if pairs.format() == quest_io::Format::JsonLines);
+        let is_lines = matches!(&opened, Opened::Pairs(pairs) if pairs.format().holds_several());
         Input {
             options: self,
             opened: Some(opened),

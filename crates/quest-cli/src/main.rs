@@ -14,6 +14,8 @@ mod in_order;
 mod input;
 mod matrix;
 mod options;
+mod parquet;
+mod plot;
 mod polynomials;
 mod progress;
 mod rows;

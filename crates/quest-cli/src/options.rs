@@ -11,6 +11,8 @@ use quest_core::{
 };
 use quest_io::{Output, WriteError};
 
+use crate::Failure;
+
 /// How a result is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
@@ -51,7 +53,7 @@ fn parse_output(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match quest_io::Format::from_extension(&path) {
         Some(quest_io::Format::Npy) => {
-            Err("results are not written as NumPy's arrays, expected .json, .jsonl, .csv or another name"
+            Err("results are not written as NumPy's arrays, expected .json, .jsonl, .csv, .parquet or another name"
                 .to_owned())
         }
         _ => Ok(path),
@@ -76,8 +78,27 @@ impl OutputOptions {
         self.output.as_deref()
     }
 
-    /// The target, found writable.
-    pub(crate) fn open(&self) -> Result<Output, WriteError> {
+    /// Whether the result is a table of Parquet, by the name of the file.
+    pub(crate) fn is_parquet(&self) -> bool {
+        let form = self.file().and_then(quest_io::Format::from_extension);
+        self.format.is_none() && form == Some(quest_io::Format::Parquet)
+    }
+
+    /// The target, found writable, of a result that is text.
+    ///
+    /// # Errors
+    /// A target that cannot be written to, and one that promises Parquet.
+    pub(crate) fn open(&self) -> Result<Output, Failure> {
+        if self.is_parquet() {
+            let message = "only the results of `quest-cli estimate` and the matches of `quest-cli colmap export` are written as \
+                           Parquet, expected .json, .jsonl, .csv or another name";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        Ok(self.open_any()?)
+    }
+
+    /// The target, found writable, of a result of any form.
+    pub(crate) fn open_any(&self) -> Result<Output, WriteError> {
         Output::open(self.output.as_deref().map(Path::new))
     }
 

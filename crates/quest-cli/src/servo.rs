@@ -5,7 +5,7 @@ mod frame;
 mod replay;
 mod summary;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use quest_core::Camera;
@@ -15,11 +15,10 @@ use quest_core::servo::{
     Length, Limits, PerFrame, Plane, Plant, PoseEstimator, Rig, Safety, Servo, Tracker, World,
 };
 use quest_core::solver::SolverName;
-use quest_io::Output;
 use rand_chacha::ChaCha8Rng;
 
 use crate::options::{Format, OutputOptions, solver_parser};
-use crate::simulate::{Plot, parse_plot};
+use crate::plot::{Plot, parse_plot};
 use crate::{Failure, Outcome, rows};
 use frame::FrameRecord;
 use summary::Summary;
@@ -86,7 +85,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "RUN.npz", conflicts_with_all = SIMULATED)]
     replay: Option<PathBuf>,
     /// Draw the run (figures 9, 10 and 12 to 19 of the paper); for the robot with the paths from five more starts.
-    #[arg(long, value_name = "FILE.svg|html", value_parser = parse_plot)]
+    #[arg(long, value_name = "FILE.svg|html|png|pdf", value_parser = parse_plot)]
     plot: Option<Plot>,
     #[command(flatten)]
     output: OutputOptions,
@@ -164,7 +163,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let mut output = arguments.output.open()?;
     let plot = match &arguments.plot {
-        Some(plot) => Some((plot, Output::open(Some(Path::new(&plot.path)))?)),
+        Some(plot) => Some((plot, plot.open()?)),
         None => None,
     };
     let run = simulate(arguments, 0);
@@ -174,12 +173,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Format::Jsonl => run.frames.iter().try_for_each(|frame| rows::write_line(writer, frame)),
         Format::Csv => frame::write_csv(writer, &run.frames),
     })?;
-    if let Some((plot, mut file)) = plot {
+    if let Some((plot, file)) = plot {
         let starts = if arguments.scenario == Scenario::Robot { 1..6 } else { 1..1 };
         let others: Vec<_> = starts.map(|index| simulate(arguments, index)).collect();
-        let text = charts::drawn(&arguments.title(), &run, &others, plot.is_svg)?;
-        file.write(|w| w.write_all(text.as_bytes()))?;
-        file.finish()?;
+        plot.write(file, charts::drawn(&arguments.title(), &run, &others, plot.is_svg())?)?;
     }
     output.finish()?;
     Ok(if run.summary.reached { Outcome::Answer } else { Outcome::NoPose })

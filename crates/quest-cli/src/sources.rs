@@ -58,11 +58,14 @@ fn of_folder(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let entries = fs::read_dir(folder).map_err(|e| fail(format!("cannot be read: {e}")))?;
     let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>();
     let paths = paths.map_err(|e| fail(format!("cannot be read: {e}")))?;
-    let is_known = |path: &PathBuf| path.is_file() && Format::from_extension(path).is_some();
+    let is_known =
+        |path: &PathBuf| path.is_file() && Format::from_extension(path).is_some_and(Format::is_built);
     let mut files: Vec<_> = paths.into_iter().filter(is_known).collect();
     files.sort();
     if files.is_empty() {
-        let extensions = Format::ALL.map(|format| format.info().extensions).concat().join(", .");
+        let built = Format::ALL.into_iter().filter(|format| format.is_built());
+        let extensions =
+            built.flat_map(|format| format.info().extensions).copied().collect::<Vec<_>>().join(", .");
         return Err(fail(format!("found a folder without files of matches, expected one of .{extensions}")));
     }
     Ok(files)

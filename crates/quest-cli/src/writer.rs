@@ -2,12 +2,13 @@
 
 use std::io::{self, Write};
 
-use quest_io::{Output, WriteError};
+use quest_io::{EstimateRecord, Output, WriteError};
 use serde::Serialize;
 
 use crate::{
     Failure,
     options::{Format, OutputOptions},
+    parquet::{self, PosesTable},
     rows,
 };
 
@@ -18,6 +19,11 @@ pub(crate) trait Record: Serialize {
 
     /// The rows of the pair with this number, counted from one. The first pair also has the header.
     fn write_csv(&self, writer: &mut dyn Write, pair: usize) -> io::Result<()>;
+
+    /// The result where it can be a row of a table of poses.
+    fn as_estimate(&self) -> Option<&EstimateRecord> {
+        None
+    }
 }
 
 /// Writes the results of pairs as they come.
@@ -28,33 +34,39 @@ pub(crate) struct Writer<R> {
     pairs: usize,
     /// The results of `--format json`, which are one value.
     kept: Vec<R>,
+    /// The table of Parquet, where the result is one.
+    poses: Option<PosesTable>,
 }
 
 impl<R: Record> Writer<R> {
-    pub(crate) fn open(options: &OutputOptions, is_lines: bool) -> Result<Self, WriteError> {
+    pub(crate) fn open(options: &OutputOptions, is_lines: bool) -> Result<Self, Failure> {
         let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
-        Ok(Self { output: options.open()?, format, pairs: 0, kept: Vec::new() })
+        Ok(Self { output: options.open()?, format, pairs: 0, kept: Vec::new(), poses: None })
     }
 
-    /// As [`open`](Self::open), for a long run: lines of JSON go to a file as they come. With `resume` the lines of an earlier run
-    /// stay; how many there are is returned.
+    /// As [`open`](Self::open), for a long run of poses, also into a table of Parquet: lines of JSON go to a file as they come. With
+    /// `resume` the lines of an earlier run stay; how many there are is returned.
     pub(crate) fn open_long(
         options: &OutputOptions,
         is_lines: bool,
         resume: bool,
     ) -> Result<(Self, usize), Failure> {
         let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
-        if format != Format::Jsonl || !is_lines {
+        if format != Format::Jsonl || !is_lines || options.is_parquet() {
             if resume {
                 let message =
                     "found --resume, expected several pairs as input and JSON Lines as output with it"
                         .to_owned();
                 return Err(Failure::Arguments(message));
             }
-            return Ok((Self::open(options, is_lines)?, 0));
+            let Some(file) = options.file().filter(|_| options.is_parquet()) else {
+                return Ok((Self::open(options, is_lines)?, 0));
+            };
+            let poses = Some(parquet::made(PosesTable::new(), file)?);
+            return Ok((Self { output: options.open_any()?, format, pairs: 0, kept: Vec::new(), poses }, 0));
         }
         let (output, pairs) = options.open_growing(resume)?;
-        Ok((Self { output, format, pairs, kept: Vec::new() }, pairs))
+        Ok((Self { output, format, pairs, kept: Vec::new(), poses: None }, pairs))
     }
 
     pub(crate) fn write(
@@ -65,6 +77,9 @@ impl<R: Record> Writer<R> {
     ) -> Result<(), WriteError> {
         self.pairs += 1;
         let is_first = self.pairs == 1;
+        if let (Some(poses), Some(record)) = (&mut self.poses, record.as_estimate()) {
+            return self.output.write(|w| poses.write(record, w));
+        }
         match self.format {
             Format::Json => {
                 self.kept.push(record);
@@ -81,7 +96,9 @@ impl<R: Record> Writer<R> {
 
     /// One pair is one JSON object, JSON Lines are a list of them.
     pub(crate) fn finish(mut self, is_list: bool) -> Result<(), WriteError> {
-        if self.format == Format::Json {
+        if let Some(poses) = self.poses.take() {
+            self.output.write(|w| poses.finish(w))?;
+        } else if self.format == Format::Json {
             let kept = &self.kept;
             self.output.write(|w| match kept.as_slice() {
                 [one] if !is_list => quest_io::write_json(w, one),

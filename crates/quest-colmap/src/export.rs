@@ -1,4 +1,4 @@
-//! What a database holds for other programs: matches as JSON Lines, poses with their covariances as a graph in g2o's form.
+//! What a database holds for other programs: matches, also as JSON Lines, poses with their covariances as a graph in g2o's form.
 
 use std::io::{self, Write};
 
@@ -41,10 +41,23 @@ impl<'a> CameraLine<'a> {
 
 #[derive(Serialize)]
 struct MatchLine<'a> {
-    name: String,
+    name: &'a str,
     camera1: CameraLine<'a>,
     camera2: CameraLine<'a>,
-    matches: Vec<[f32; 4]>,
+    matches: &'a [[f32; 4]],
+}
+
+/// The matches of a pair of images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairMatches {
+    /// The pair.
+    pub key: PairId,
+    /// The names of the two images, with a space between.
+    pub name: String,
+    /// Their cameras.
+    pub cameras: [Camera; 2],
+    /// `u1, v1, u2, v2` in pixels.
+    pub matches: Vec<[f32; 4]>,
 }
 
 /// Writes the matches of pairs as JSON Lines, as `quest-cli estimate` reads them: the name is that of the two images, with a space
@@ -58,6 +71,28 @@ pub fn export_matches(
     writer: &mut dyn Write,
     watch: &dyn Watch,
 ) -> Result<Exported, ColmapError> {
+    export_each(database, pairs, watch, |pair| {
+        let [camera1, camera2] = &pair.cameras;
+        let line = MatchLine {
+            name: &pair.name,
+            camera1: CameraLine::new(camera1),
+            camera2: CameraLine::new(camera2),
+            matches: &pair.matches,
+        };
+        writer.write_all((serde_json::to_string(&line)? + "\n").as_bytes())
+    })
+}
+
+/// Hands the matches of pairs to `write`, one pair after the other.
+///
+/// # Errors
+/// [`ColmapError::Sqlite`]; what `write` says, as [`ColmapError::Io`].
+pub fn export_each(
+    database: &Database,
+    pairs: &[PairId],
+    watch: &dyn Watch,
+    mut write: impl FnMut(&PairMatches) -> io::Result<()>,
+) -> Result<Exported, ColmapError> {
     let failed = |source| ColmapError::Io { file: "output".to_owned(), source };
     let mut exported = Exported::default();
     for (done, &key) in pairs.iter().enumerate() {
@@ -66,9 +101,9 @@ pub fn export_matches(
         }
         let (a, b) = key.images();
         let name = format!("{} {}", database.name(a), database.name(b));
-        match line(database, key, name.clone())? {
-            Ok(text) => {
-                writer.write_all(text.as_bytes()).map_err(failed)?;
+        match matches_of(database, key, name.clone())? {
+            Ok(pair) => {
+                write(&pair).map_err(failed)?;
                 exported.written += 1;
             }
             Err(reason) => exported.left.push((name, reason)),
@@ -78,10 +113,14 @@ pub fn export_matches(
     Ok(exported)
 }
 
-fn line(database: &Database, key: PairId, name: String) -> Result<Result<String, String>, ColmapError> {
+fn matches_of(
+    database: &Database,
+    key: PairId,
+    name: String,
+) -> Result<Result<PairMatches, String>, ColmapError> {
     let (a, b) = key.images();
     let (matches, image1, image2) = (database.matches(key)?, database.keypoints(a)?, database.keypoints(b)?);
-    let text = || {
+    let pair = || {
         let (matches, image1, image2) = (matches?, image1?, image2?);
         let (pixels1, pixels2) = (image1.pixels()?, image2.pixels()?);
         let pixel = |pixels: &[[f32; 2]], index: u32| {
@@ -93,11 +132,9 @@ fn line(database: &Database, key: PairId, name: String) -> Result<Result<String,
             Ok([u1, v1, u2, v2])
         };
         let matches = matches.0.iter().map(row).collect::<Result<Vec<_>, String>>()?;
-        let (camera1, camera2) = (CameraLine::new(&image1.camera), CameraLine::new(&image2.camera));
-        let line = MatchLine { name, camera1, camera2, matches };
-        serde_json::to_string(&line).map(|text| text + "\n").map_err(|error| error.to_string())
+        Ok(PairMatches { key, name, cameras: [image1.camera, image2.camera], matches })
     };
-    Ok(text())
+    Ok(pair())
 }
 
 /// An edge of the graph of poses.

@@ -54,7 +54,7 @@ mod write;
 pub use camera::ColmapCamera;
 pub use database::{Database, ImageRow};
 pub use error::ColmapError;
-pub use export::{Exported, PoseEdge, export_matches, export_poses, write_g2o};
+pub use export::{Exported, PairMatches, PoseEdge, export_each, export_matches, export_poses, write_g2o};
 pub use geometry::{Config, TwoViewGeometry};
 pub use given::Given;
 pub use image::{Matches, Rays};

@@ -39,7 +39,7 @@ impl Place {
     /// The error that `fault` is in this place.
     #[must_use]
     pub fn error(self, fault: impl Into<Fault>) -> ReadError {
-        ReadError { place: self, fault: Box::new(fault.into()) }
+        ReadError { place: self, key: None, fault: Box::new(fault.into()) }
     }
 }
 
@@ -62,6 +62,8 @@ impl fmt::Display for Place {
 pub struct ReadError {
     /// The place of the error.
     pub place: Place,
+    /// The key of the pair that could not be read, where its file gives it one.
+    pub key: Option<u64>,
     /// What was found, and what was expected.
     pub fault: Box<Fault>,
 }
@@ -132,6 +134,12 @@ pub enum Fault {
         /// What a row was expected to be.
         expected: &'static str,
     },
+    /// A file of Parquet, for which the reader was not built.
+    #[error("this build has no Parquet: cargo install quest-cli --features parquet")]
+    NoParquet,
+    /// A file of Parquet is damaged, or has other columns.
+    #[error("{0}")]
+    Parquet(String),
     /// A file of points where matches were expected.
     #[error(
         "found two columns, the points of one image, expected matches, or --points2 with those of the other image"

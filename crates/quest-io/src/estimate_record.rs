@@ -11,6 +11,12 @@ use crate::record::{rows, unsigned_zero};
 /// The result of one estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EstimateRecord {
+    /// The key of the pair, which seeds its search: that of its file, else its number. Only Parquet has it.
+    #[serde(skip)]
+    pub key: u64,
+    /// How many matches were read. Files have one of `inliers` for each where a pose was found.
+    #[serde(skip)]
+    pub match_count: usize,
     /// What the input calls the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -172,6 +178,8 @@ impl EstimateRecord {
     pub fn new(name: Option<String>, estimate: &Estimate, truth: &Truth, elapsed_ms: f64) -> Self {
         let pose = &estimate.pose;
         Self {
+            key: 0,
+            match_count: estimate.inliers.len(),
             name,
             model: Some(estimate.model.name()),
             reason: None,
@@ -196,6 +204,8 @@ impl EstimateRecord {
     #[must_use]
     pub fn unanswered(name: Option<String>, reason: String) -> Self {
         Self {
+            key: 0,
+            match_count: 0,
             name,
             model: None,
             reason: Some(reason),

@@ -15,6 +15,7 @@
 //!   was found and what was expected.
 //! - [`read_camera`] opens a calibration of OpenCV or ROS, or COLMAP's cameras.
 //! - [`SolveRecord`] and [`EstimateRecord`] are the results of a solve and of an estimate as they stand in files.
+//! - With the feature `parquet` files of Parquet are read, and `MatchesTable` and `PosesTable` write them.
 //! - [`Output`] writes a file whole or not at all; [`write_json`] writes JSON for people.
 #![forbid(unsafe_code)]
 
@@ -25,6 +26,8 @@ mod json_text;
 mod npz;
 mod output;
 mod pair;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod read;
 mod record;
 
@@ -37,5 +40,7 @@ pub use json_text::write_json;
 pub use npz::unpack_npz;
 pub use output::{Output, WriteError};
 pub use pair::{Gap, Pair, Truth};
+#[cfg(feature = "parquet")]
+pub use parquet::{MatchesTable, PosesTable};
 pub use read::{Format, FormatInfo, MOST_BYTES, Pairs, STANDARD_INPUT, read, read_points, read_within};
 pub use record::{CandidateRecord, SolveRecord};

@@ -11,6 +11,8 @@ use crate::error::{Fault, Place, ReadError};
 pub struct Pair {
     /// What the file calls the pair.
     pub name: Option<String>,
+    /// The key that the file gives the pair, which seeds its search in place of its number.
+    pub key: Option<u64>,
     /// The cameras of view 1 and view 2; without them `matches` are on the planes `z = 1`.
     pub cameras: Option<[Camera; 2]>,
     /// `u1, v1, u2, v2` of each match. A coordinate that the file gives as NaN, infinite or missing is NaN.

@@ -13,6 +13,8 @@
 //! # Ok::<(), quest_plot::PlotError>(())
 //! ```
 //!
+//! With the feature `figures` a drawing is also PNG (`to_png`) or PDF (`to_pdf`).
+//!
 //! A [`Figure`] is a grid of [`Panel`]s; a panel has two [`Axis`] and some [`Series`], each with a direct label at its end.
 //! A [`Space`] is a scene in three dimensions whose parts are switched on and off; it is also written as PLY. Series, and parts of a space, with the same
 //! name are one entry of the page's legend.
@@ -25,6 +27,8 @@ mod figure;
 mod html;
 mod label;
 mod page;
+#[cfg(feature = "figures")]
+mod picture;
 mod ply;
 mod space;
 mod svg;
@@ -34,5 +38,7 @@ pub use colour::Colour;
 pub use error::PlotError;
 pub use figure::{Figure, Panel, Series, Style};
 pub use page::Page;
+#[cfg(feature = "figures")]
+pub use picture::{to_pdf, to_png};
 pub use space::{Part, Projection, Space};
 pub use svg::to_svg;

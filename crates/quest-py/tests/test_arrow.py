@@ -1,6 +1,7 @@
 """Columns in and out: partitions and retries change no bit."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 import quest_pose as qp
 from quest_pose import arrow, dask
 from scenes import make_scene
+from test_colmap import planted
 
 PARAMS = [1060.0, 1060.0, 514.0, 384.0]
 CAMERA = qp.Camera("PINHOLE", PARAMS)
@@ -181,6 +183,68 @@ def test_on_dask(tmp_path: Path) -> None:
     with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
         files = dask.estimate_parquet(client, tmp_path / "pairs.parquet", tmp_path / "poses", rows=2)
     assert [parquet.read_table(file).num_rows for file in files] == [2, 2]
+
+
+def tool(*arguments: str | Path) -> None:
+    """Runs the tool, which is named by the environment and was built with Parquet."""
+    if "QUEST_CLI" not in os.environ:
+        pytest.skip("QUEST_CLI names no quest-cli that was built with --features parquet")
+    subprocess.run([os.environ["QUEST_CLI"], *arguments, "--quiet"], check=True)
+
+
+def test_the_tool_has_the_same_columns_and_bits(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    name = pa.field("name", pa.string())
+    # What pandas, Polars and Spark write: other lists, other numbers, groups of rows.
+    forms = {
+        "lists": pa.list_(pa.list_(pa.float64())),
+        "large": pa.large_list(pa.large_list(pa.float64())),
+        "sizes": arrow.schema_in().field("x1").type,
+    }
+    rows = [row for k, row in enumerate(pairs(7)) if k != 4]
+    expected = arrow.estimate(table(rows)).to_pylist()
+    for form, points in forms.items():
+        schema = pa.schema([f.with_type(points) if f.name in ("x1", "x2") else f for f in arrow.schema_in()])
+        source, target = tmp_path / f"{form}.parquet", tmp_path / "poses.parquet"
+        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), source, row_group_size=2)
+        tool("estimate", source, "-o", target)
+        assert parquet.read_schema(target).equals(arrow.schema_out().append(name))
+        assert parquet.read_table(target).drop_columns("name").to_pylist() == expected
+
+
+def test_the_tool_says_what_a_pair_lacks(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    rows = pairs(7)
+    rows[1] |= {"x1": None}
+    rows[2] |= {"x2": [*rows[2]["x2"][:-1], [None, 1.0]]}
+    rows[5] |= {"x2": rows[5]["x2"][1:]}
+    parquet.write_table(pa.Table.from_pylist(rows, schema=arrow.schema_in()), tmp_path / "pairs.parquet")
+    with pytest.raises(subprocess.CalledProcessError) as error:
+        tool("estimate", tmp_path / "pairs.parquet", "-o", tmp_path / "poses.parquet")
+    assert error.value.returncode == 1
+    found = parquet.read_table(tmp_path / "poses.parquet").to_pylist()
+    assert [row["pair"] for row in found] == [row["pair"] for row in rows]
+    assert [row["q_wxyz"] is None for row in found] == [False, True, False, False, True, True, False]
+    assert [row["invalid_count"] for row in found] == [0, 0, 1, 0, 0, 0, 0]
+    assert "x1: found null" in found[1]["reason"]
+    assert "found 3 matches" in found[4]["reason"]
+    assert found[4]["inliers"] == [False] * 3
+    assert "x2: found 24 points, expected 25" in found[5]["reason"]
+
+
+def test_the_tool_exports_what_is_read_here(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path = planted(tmp_path / "a.db")
+    tool("colmap", "export", path, "-o", tmp_path / "pairs.parquet")
+    tool("estimate", tmp_path / "pairs.parquet", "-o", tmp_path / "poses.parquet")
+    matches = parquet.read_table(tmp_path / "pairs.parquet")
+    assert matches.schema.equals(arrow.schema_in().remove(7).append(matches.schema.field("name")))
+    assert matches.column("name").to_pylist()[0] == "1.jpg 2.jpg"
+    found = parquet.read_table(tmp_path / "poses.parquet")
+    assert found.drop_columns("name").to_pylist() == arrow.estimate(matches).to_pylist()
+    assert found.column("name").to_pylist() == matches.column("name").to_pylist()
 
 
 def test_pyarrow_is_needed_only_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ mod page;
 mod scene;
 mod sphere;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use quest_core::{
@@ -12,11 +12,10 @@ use quest_core::{
     feasibility::{Verdict, verdict},
     solver::{Kinds, PoseSolver, Quest},
 };
-use quest_io::Output;
 
 use crate::{
     Failure, Outcome,
-    simulate::{Plot, parse_plot},
+    plot::{Plot, parse_plot},
     solve,
 };
 
@@ -37,8 +36,9 @@ Examples:
 pub(crate) struct Arguments {
     /// A pair of five or more correct matches, as for `solve`; the paper's example if it is absent.
     file: Option<PathBuf>,
-    /// Draw into this file: .svg, or .html for a page that works offline.
-    #[arg(short, long, value_name = "FILE.svg|html", value_parser = parse_plot)]
+    /// Draw into this file: .svg, .html for a page that works offline, or .png and .pdf (where the tool was built with the
+    /// feature `figures`).
+    #[arg(short, long, value_name = "FILE.svg|html|png|pdf", value_parser = parse_plot)]
     output: Plot,
 }
 
@@ -61,7 +61,7 @@ struct Drawn {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut output = Output::open(Some(Path::new(&arguments.output.path)))?;
+    let output = arguments.output.open()?;
     let (title, matches) = match &arguments.file {
         None => ("Appendix B: which candidates are feasible".to_owned(), scene::of_the_paper()),
         Some(file) => {
@@ -73,9 +73,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         }
     };
     let drawn = Drawn::new(title, matches)?;
-    let text = if arguments.output.is_svg { page::svg(&drawn)? } else { page::html(&drawn)? };
-    output.write(|writer| writer.write_all(text.as_bytes()))?;
-    output.finish()?;
+    let text = if arguments.output.is_svg() { page::svg(&drawn)? } else { page::html(&drawn)? };
+    arguments.output.write(output, text)?;
     Ok(Outcome::Answer)
 }
 

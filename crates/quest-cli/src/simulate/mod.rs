@@ -9,19 +9,17 @@ mod statistics;
 mod summary;
 mod timing;
 
-use std::path::{Path, PathBuf};
-
 use clap::{Args, ValueEnum};
 use quest_core::{
     simulate::{Boxes, Figure, Layout, Motion, SceneOptions},
     solver::{Kinds, SolverName},
 };
-use quest_io::Output;
 
 use self::{pairs::Planted, record::Record, run::Run};
 use crate::{
     Failure, Outcome,
     options::{Format, OutputOptions, kinds_parser, solver_parser},
+    plot::{Plot, parse_plot},
     progress::ProgressOptions,
     rows,
 };
@@ -117,8 +115,9 @@ pub(crate) struct Arguments {
     /// Round pixels to whole numbers after the noise. Table 1 always does, as in the paper.
     #[arg(long)]
     rounded: bool,
-    /// Draw the figures into this file: .svg, or .html for a page that works offline.
-    #[arg(long, value_name = "FILE.svg|html", value_parser = parse_plot)]
+    /// Draw the figures into this file: .svg, .html for a page that works offline, or .png and .pdf (where the tool was built with the
+    /// feature `figures`).
+    #[arg(long, value_name = "FILE.svg|html|png|pdf", value_parser = parse_plot)]
     plot: Option<Plot>,
     /// Number of threads; 0 takes as many as there are cores.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -137,26 +136,9 @@ enum Scenes {
     Realistic,
 }
 
-/// Where figures are drawn.
-#[derive(Clone, Debug)]
-pub(crate) struct Plot {
-    pub(crate) path: PathBuf,
-    pub(crate) is_svg: bool,
-}
-
 fn parse_figure(text: &str) -> Result<Figure, String> {
     let found = Figure::ALL.into_iter().find(|figure| figure.number().to_string() == text);
     found.ok_or_else(|| "expected 4, 5, 6, 7 or 8".to_owned())
-}
-
-pub(crate) fn parse_plot(text: &str) -> Result<Plot, String> {
-    let path = PathBuf::from(text);
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("svg") => Ok(Plot { path, is_svg: true }),
-        Some("html" | "htm") => Ok(Plot { path, is_svg: false }),
-        _ => Err("expected a name that ends with .svg or .html".to_owned()),
-    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -174,7 +156,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         return Ok(Outcome::Answer);
     }
     let plot = match &arguments.plot {
-        Some(plot) => Some((plot, Output::open(Some(Path::new(&plot.path)))?)),
+        Some(plot) => Some((plot, plot.open()?)),
         None => None,
     };
     let run = arguments.plan()?;
@@ -190,10 +172,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Format::Jsonl => records.iter().try_for_each(|record| rows::write_line(w, record)),
         Format::Csv => rows::write_csv(w, &records),
     })?;
-    if let Some((plot, mut file)) = plot {
-        let text = curves::drawn(&run, &records, plot.is_svg)?;
-        file.write(|w| w.write_all(text.as_bytes()))?;
-        file.finish()?;
+    if let Some((plot, file)) = plot {
+        plot.write(file, curves::drawn(&run, &records, plot.is_svg())?)?;
     }
     output.finish()?;
     Ok(Outcome::Answer)

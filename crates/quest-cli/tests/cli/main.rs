@@ -6,6 +6,7 @@ mod candidates;
 mod estimate;
 #[cfg(target_os = "linux")]
 mod faults;
+mod features;
 mod formats;
 mod instructions;
 mod lines;

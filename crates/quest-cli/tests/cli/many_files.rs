@@ -79,8 +79,10 @@ fn what_stands_for_no_file_is_an_error() {
     let run = |argument: &str| run_in(empty.path(), &["estimate", argument], b"");
     let (folder, pattern) = (run("."), run("*.npz"));
     assert_eq!((folder.status, pattern.status), (2, 2));
-    let extensions = "expected one of .json, .jsonl, .ndjson, .csv, .npy, .npz\n";
-    assert_eq!(folder.stderr, format!("error: .: found a folder without files of matches, {extensions}"));
+    let extensions = "expected one of .json, .jsonl, .ndjson, .csv, .npy, .npz";
+    let parquet = if cfg!(feature = "parquet") { ", .parquet" } else { "" };
+    let expected = format!("error: .: found a folder without files of matches, {extensions}{parquet}\n");
+    assert_eq!(folder.stderr, expected);
     assert_eq!(pattern.stderr, "error: *.npz: found no file of this pattern, expected at least one\n");
 }
 

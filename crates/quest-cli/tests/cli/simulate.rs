@@ -97,7 +97,7 @@ fn bad_arguments_are_named() {
         (&["--figure", "3"][..], "4, 5, 6, 7 or 8"),
         (&["--table", "2"], "2 is not in 1..=1"),
         (&["--figure", "4", "--trials", "0"], "0 is not in"),
-        (&["--figure", "4", "--plot", "a.png"], ".svg or .html"),
+        (&["--figure", "4", "--plot", "a.gif"], ".svg, .png, .pdf or .html"),
         (&["--figure", "4", "--solvers", "eight-point"], "eight-point needs 8 points"),
         (&["--figure", "4", "--solvers", "none"], "none"),
         (&["--figure", "4", "--trials", "1", "-o", "/no/such/directory/a.csv"], "/no/such/directory/a.csv"),

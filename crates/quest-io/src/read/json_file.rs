@@ -160,6 +160,7 @@ fn check<M>(
     let t_21 = file.t_21.map(|t| Vector3::from(t.0));
     Ok(Pair {
         name: file.name,
+        key: None,
         cameras,
         matches: file.matches.into_iter().map(numbers).collect(),
         first_gap: None,

@@ -6,6 +6,8 @@ mod gaps;
 mod json_file;
 mod json_words;
 mod npy_file;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 mod table;
 
 use std::{
@@ -26,6 +28,9 @@ pub use bounded::MOST_BYTES;
 /// What standard input is called in messages.
 pub const STANDARD_INPUT: &str = "standard input";
 
+/// How a file of Parquet begins.
+const PARQUET: &[u8] = b"PAR1";
+
 /// The form of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -37,6 +42,8 @@ pub enum Format {
     Csv,
     /// An array of NumPy's, or an archive of them: one pair.
     Npy,
+    /// A table of Parquet, one pair a row.
+    Parquet,
 }
 
 /// What is told of a form.
@@ -52,7 +59,7 @@ pub struct FormatInfo {
 
 impl Format {
     /// Every form.
-    pub const ALL: [Self; 4] = [Self::Json, Self::JsonLines, Self::Csv, Self::Npy];
+    pub const ALL: [Self; 5] = [Self::Json, Self::JsonLines, Self::Csv, Self::Npy, Self::Parquet];
 
     /// What is told of it.
     #[must_use]
@@ -72,10 +79,27 @@ impl Format {
                 extensions: &["npy", "npz"],
                 help: "An array of NumPy's, one match a row, or an archive of arrays",
             },
+            Self::Parquet => FormatInfo {
+                name: "parquet",
+                extensions: &["parquet"],
+                help: "A table, one pair a row (where the tool was built with the feature `parquet`)",
+            },
         }
     }
 
-    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`, `.npy` or `.npz`.
+    /// Whether this build reads files of this form.
+    #[must_use]
+    pub fn is_built(self) -> bool {
+        self != Self::Parquet || cfg!(feature = "parquet")
+    }
+
+    /// Whether a file may hold several pairs.
+    #[must_use]
+    pub fn holds_several(self) -> bool {
+        matches!(self, Self::JsonLines | Self::Parquet)
+    }
+
+    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`, `.npy` or `.npz`, `.parquet`.
     #[must_use]
     pub fn from_extension(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -89,12 +113,14 @@ impl Format {
     }
 }
 
-/// The pairs of a file, one after the other. A line of JSON Lines that is no pair is an error with its line, after which the next
-/// line follows; after any other error there are no more.
+/// The pairs of a file, one after the other. A line of JSON Lines or a row of Parquet that is no pair is an error with its line,
+/// after which the next one follows; after any other error there are no more.
 pub struct Pairs {
     place: Place,
     format: Format,
     input: Box<dyn BufRead>,
+    #[cfg(feature = "parquet")]
+    rows: Option<Box<parquet_file::Rows>>,
     /// The most bytes of a pair.
     most: u64,
     /// Lines read so far.
@@ -141,7 +167,26 @@ pub fn read_within(path: &Path, format: Option<Format>, most: u64) -> Result<Pai
         input = Box::new(Cursor::new(start).chain(input));
         format
     };
-    Ok(Pairs { place, format, input, most, line: 0, found_any: false, done: false })
+    #[cfg(not(feature = "parquet"))]
+    if format == Format::Parquet {
+        return Err(place.error(Fault::NoParquet));
+    }
+    #[cfg(feature = "parquet")]
+    let rows = match format {
+        Format::Parquet => Some(Box::new(parquet_file::Rows::open(path, &place, &mut *input, most)?)),
+        _ => None,
+    };
+    Ok(Pairs {
+        place,
+        format,
+        input,
+        #[cfg(feature = "parquet")]
+        rows,
+        most,
+        line: 0,
+        found_any: false,
+        done: false,
+    })
 }
 
 /// All bytes of a file.
@@ -172,6 +217,7 @@ fn sniff(input: &mut dyn BufRead, most: u64) -> Result<(Format, Vec<u8>), Fault>
     let is_whole = serde_json::from_slice::<serde::de::IgnoredAny>(&text[first]).is_ok();
     let format = match (is_json, is_whole) {
         (false, _) if npy_file::is_one(&text) => Format::Npy,
+        (false, _) if text.starts_with(PARQUET) => Format::Parquet,
         (false, _) => Format::Csv,
         (true, true) if !next_line(input, most, &mut text)?.is_empty() => Format::JsonLines,
         (true, _) => Format::Json,
@@ -218,6 +264,7 @@ impl Pairs {
                 json_file::parse(&self.place, text(&self.place, &bytes)?)
             }
             Format::Csv | Format::Npy => Ok(self.rows(&MATCHES)?.pair(&self.place)),
+            Format::Parquet => Err(self.place.clone().error(Fault::NoParquet)),
         }
     }
 
@@ -226,6 +273,7 @@ impl Pairs {
         let bytes = self.bytes()?;
         match self.format {
             Format::Json | Format::JsonLines => Err(self.place.clone().error(Fault::NoPoints("JSON"))),
+            Format::Parquet => Err(self.place.clone().error(Fault::NoPoints("Parquet"))),
             Format::Csv => csv_file::parse(&self.place, text(&self.place, &bytes)?, columns),
             Format::Npy => npy_file::parse(&self.place, &bytes, columns, self.most),
         }
@@ -279,11 +327,13 @@ impl Iterator for Pairs {
         }
         let pair = match self.format {
             Format::JsonLines => self.one_line(),
-            Format::Json | Format::Csv | Format::Npy => Some(self.whole()),
+            #[cfg(feature = "parquet")]
+            Format::Parquet => self.rows.as_mut()?.next(),
+            _ => Some(self.whole()),
         };
         self.found_any = true;
         let is_line = |error: &ReadError| error.place.line.is_some();
-        self.done = self.format != Format::JsonLines
+        self.done = !self.format.holds_several()
             || match &pair {
                 Some(Ok(_)) => false,
                 Some(Err(error)) => !is_line(error),

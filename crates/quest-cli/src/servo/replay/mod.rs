@@ -6,18 +6,15 @@ mod summary;
 
 use std::path::Path;
 
-use quest_io::Output;
-
 use crate::options::{Format, OutputOptions};
-use crate::simulate::Plot;
+use crate::plot::Plot;
 use crate::{Failure, Outcome, rows};
 use summary::Row;
 
 /// Reads the run at `path`, says what happened, and draws it.
 pub(super) fn run(path: &Path, plot: Option<&Plot>, options: &OutputOptions) -> Result<Outcome, Failure> {
     let mut output = options.open()?;
-    let page =
-        plot.map(|plot| Output::open(Some(Path::new(&plot.path))).map(|file| (plot, file))).transpose()?;
+    let page = plot.map(|plot| plot.open().map(|file| (plot, file))).transpose()?;
     let recorded = archive::read(path)?;
     if recorded.images.is_empty() {
         return Err(Failure::Arguments(format!("{}: found no image, expected at least one", path.display())));
@@ -31,10 +28,8 @@ pub(super) fn run(path: &Path, plot: Option<&Plot>, options: &OutputOptions) -> 
         Format::Jsonl => recorded.images.iter().try_for_each(|i| rows::write_line(writer, &Row::new(i))),
         Format::Csv => rows::write_csv(writer, &recorded.images.iter().map(Row::new).collect::<Vec<_>>()),
     })?;
-    if let Some((plot, mut file)) = page {
-        let text = charts::drawn(&summary, &recorded, plot.is_svg)?;
-        file.write(|w| w.write_all(text.as_bytes()))?;
-        file.finish()?;
+    if let Some((plot, file)) = page {
+        plot.write(file, charts::drawn(&summary, &recorded, plot.is_svg())?)?;
     }
     output.finish()?;
     Ok(Outcome::Answer)
