@@ -113,7 +113,7 @@ def test_gtsfm(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (R, t, len(verified), ratio) == (None, None, 0, 0.0)
 
 
-def test_glue_factorys_loader_takes_the_class(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_loader_of_glue_factory_takes_the_class(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes the classes of a module that belong there and are estimators."""
     base = type("BaseEstimator", (), {})
     fake(monkeypatch, "torch")
