@@ -48,6 +48,12 @@ pub(crate) trait ComplexNumber: Number {
     fn conjugate(self) -> Self;
 }
 
+/// The vector product, without a conjugate.
+#[inline(always)]
+pub(crate) fn cross<T: Number>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 impl Number for f64 {
     #[inline]
     fn real(x: f64) -> Self {

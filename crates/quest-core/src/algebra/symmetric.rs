@@ -3,7 +3,7 @@
 //! All roots of the characteristic polynomial are real, so that Newton's iteration from below the smallest one rises
 //! to it monotonically. The eigenvector is the longest column of the adjugate of the shifted matrix.
 
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3, Vector4};
 
 use super::number::Number;
 use crate::algebra::vectors::two::{Two, TwoVectors, cross, dot};
@@ -13,6 +13,21 @@ const MAX_STEPS: usize = 60;
 
 /// Sweeps of Jacobi's rotations; a matrix that is not finite takes them all.
 const MAX_SWEEPS: usize = 10;
+
+/// A symmetric matrix by the rows of its upper triangle.
+#[inline]
+pub(crate) fn symmetric<const N: usize>(upper: &[f64]) -> SMatrix<f64, N, N> {
+    let mut matrix = SMatrix::zeros();
+    let mut upper = upper.iter();
+    for a in 0..N {
+        for b in a..N {
+            let Some(&entry) = upper.next() else { return matrix };
+            matrix[(a, b)] = entry;
+            matrix[(b, a)] = entry;
+        }
+    }
+    matrix
+}
 
 /// The root that Newton's iteration reaches from `below`, for `f(x) = (value, derivative)`.
 fn smallest_root(below: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {

@@ -26,6 +26,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::algebra::vectors::exponential::{exp, ln};
 use crate::algebra::vectors::widest::{Simd, Work, widest};
+use crate::robust::conclude::length::median;
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::{Block, Framed, Lanes, WIDTH, Whitened, rows, whitened};
 use crate::solver::shared::motion::Motion;
@@ -52,7 +53,7 @@ pub(crate) const ROUNDS: usize = 12;
 const LEAST_EXPONENT: f64 = -300.0;
 
 /// A displacement by a unit of inverse depth is not shorter than this.
-const LEAST_LENGTH: f64 = 1e-12;
+const SHORTEST: f64 = 1e-12;
 
 /// What the matches say of a motion beside the best rotation.
 #[derive(Clone, Debug)]
@@ -139,14 +140,6 @@ struct Depths {
     near: f64,
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 impl Tail {
     #[inline(always)]
     fn density(&self, square: f64) -> f64 {
@@ -183,7 +176,7 @@ impl Densities {
             let along =
                 |slope: &[Lanes; 3]| slope[0][j] * t_21[0] + slope[1][j] * t_21[1] + slope[2][j] * t_21[2];
             let b = [along(&w.slope[0]), along(&w.slope[1])];
-            let length = (b[0] * b[0] + b[1] * b[1]).sqrt().max(LEAST_LENGTH);
+            let length = (b[0] * b[0] + b[1] * b[1]).sqrt().max(SHORTEST);
             let r = [w.residual[0][j], w.residual[1][j]];
             let inverse = 1.0 / length;
             let across = (r[0] * b[1] - r[1] * b[0]) * inverse;
@@ -347,9 +340,11 @@ impl Likelihood {
             .filter_map(|(across, at)| (across > least).then_some(at))
             .collect();
         let value = |[along, by_depth]: &[f64; 2]| along / by_depth;
-        let mean = median(near.iter().map(value).collect());
-        let spread = 1.48 * median(near.iter().map(|at| (value(at) - mean).abs()).collect());
-        let noise = median(near.iter().map(|[_, by_depth]| sigma / by_depth).collect());
+        let median_of =
+            |value: &dyn Fn(&[f64; 2]) -> f64| median(&mut near.iter().map(value).collect::<Vec<_>>());
+        let mean = median_of(&value);
+        let spread = 1.48 * median_of(&|at| (value(at) - mean).abs());
+        let noise = median_of(&|[_, by_depth]| sigma / by_depth);
         let square_spread = (spread * spread - noise * noise).max(0.04 * noise * noise).max(1e-30);
         Depths { mean, square_spread, near: NEAR }
     }

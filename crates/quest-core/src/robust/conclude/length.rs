@@ -312,7 +312,11 @@ fn positive(mean: f64, variance: f64) -> (f64, f64) {
     (0.5 * (mean + root), 0.5 * (1.0 + mean / root))
 }
 
-fn median(values: &mut [f64]) -> f64 {
+/// The median, the upper of two middle ones; zero of nothing.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Matrix5, Vector5};
 
 use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
+use crate::algebra::symmetric::symmetric;
 use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::epipolar_frame::tangent_basis;
 use crate::robust::data::columns::Columns;
@@ -149,19 +150,9 @@ impl Subset {
                 }
             }
         }
-        let mut hessian = Matrix5::zeros();
-        let mut entry = 0;
-        for a in 0..5 {
-            for b in a..5 {
-                let sum = upper[entry].iter().sum();
-                hessian[(a, b)] = sum;
-                hessian[(b, a)] = sum;
-                entry += 1;
-            }
-        }
         Equations {
             cost: cost.iter().sum(),
-            hessian,
+            hessian: symmetric(&upper.map(|lanes| lanes.iter().sum())),
             gradient: Vector5::from_fn(|a, _| gradient[a].iter().sum()),
         }
     }

@@ -4,6 +4,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
 use crate::algebra::descent::{Descent, Outcome, Schedule, Singular, descend};
+use crate::algebra::number::cross;
 use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::data::point_transfer::{Framed, Lanes, WIDTH, rows, whitened};
 use crate::robust::refine::loss::{LEAST_SQUARES, RobustLoss};
@@ -43,11 +44,7 @@ impl Parameters<3> for Turn {
     /// `y × slope`.
     #[inline(always)]
     fn row(self, slope: &[f64; 3], _: &[f64; 3], y: &[f64; 3]) -> [f64; 3] {
-        [
-            y[1] * slope[2] - y[2] * slope[1],
-            y[2] * slope[0] - y[0] * slope[2],
-            y[0] * slope[1] - y[1] * slope[0],
-        ]
+        cross(y, slope)
     }
 }
 

@@ -10,14 +10,9 @@
 
 use nalgebra::ComplexField;
 
-use crate::algebra::number::{ComplexNumber, Number};
+use crate::algebra::number::{ComplexNumber, Number, cross};
 
 type Vector<T> = [T; 3];
-
-#[inline]
-fn cross<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 /// The quaternion of one of the two rotations, scalar first and of any scale, and the translation with `t·t = 1`, of an
 /// essential matrix of any scale, row by row.

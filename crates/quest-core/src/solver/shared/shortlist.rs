@@ -243,10 +243,7 @@ impl Shortlist {
     /// Drops all but so many, those with the smallest costs.
     pub(crate) fn keep_best(&mut self, most: usize, gram: &Gram) {
         while self.len > most {
-            let costs = self.iter().map(|item| gram.cost(&item.motion));
-            let worst = costs.enumerate().max_by(|(_, x), (_, y)| x.total_cmp(y));
-            let Some((worst, _)) = worst else { return };
-            self.remove(worst);
+            self.remove_worst(|item| gram.cost(&item.motion));
         }
     }
 
@@ -255,16 +252,16 @@ impl Shortlist {
     pub(crate) fn keep_motions_of_five(&mut self, matches: &[Correspondence]) {
         const MOST: usize = 20;
         while 2 * self.len > MOST && self.iter().map(Item::motions).sum::<usize>() > MOST {
-            let costs = self.iter().map(|item| item.motion.truncated_cost(matches, f64::INFINITY));
-            let worst = costs.enumerate().max_by(|(_, x), (_, y)| x.total_cmp(y));
-            let Some((worst, _)) = worst else { return };
-            self.remove(worst);
+            self.remove_worst(|item| item.motion.truncated_cost(matches, f64::INFINITY));
         }
     }
 
-    fn remove(&mut self, place: usize) {
-        self.items.copy_within(place + 1..self.len, place);
-        self.len -= 1;
+    fn remove_worst(&mut self, cost: impl Fn(&Item) -> f64) {
+        let costs = self.iter().map(cost).enumerate();
+        if let Some((worst, _)) = costs.max_by(|(_, x), (_, y)| x.total_cmp(y)) {
+            self.items.copy_within(worst + 1..self.len, worst);
+            self.len -= 1;
+        }
     }
 
     /// Those whose costs are not too far above the smallest, the best first.

@@ -1,7 +1,9 @@
 //! What a round of a [fit](super::fit) sums up over all matches, a few of them at a time in lanes.
 
-use nalgebra::{Matrix6, SMatrix};
+use nalgebra::Matrix6;
 
+use crate::algebra::number::cross;
+use crate::algebra::symmetric::symmetric;
 use crate::algebra::vectors::widest::{Simd, Work, add_product, widest};
 use crate::robust::conclude::depth_field::field::{DepthField, Equations, PARAMETERS, Parameters, Terms};
 use crate::robust::conclude::evidence::{Explained, Likelihood, Places};
@@ -103,7 +105,7 @@ impl Placed {
             u[1][j] = u1;
             let slope = [0, 1, 2].map(|k| w.slope[0][k][j] * u0 + w.slope[1][k][j] * u1);
             let y = [w.y[0][j], w.y[1][j], w.y[2][j]];
-            for (k, turn) in cross(y, slope).into_iter().enumerate() {
+            for (k, turn) in cross(&y, &slope).into_iter().enumerate() {
                 by_turn[k][j] = turn;
                 by_unit[k][j] = slope[k];
             }
@@ -118,11 +120,6 @@ impl Placed {
     pub(crate) fn rho(&self, j: usize) -> f64 {
         self.mean[j] + self.share[j] * (self.depth[j] - self.mean[j])
     }
-}
-
-#[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]
@@ -204,7 +201,7 @@ impl InLanes {
             weights[2][j] = of_field * rho * rho + of_near * own * own;
             let (u0, u1) = (placed.u[0][j], placed.u[1][j]);
             let slope = [0, 1, 2].map(|k| w.slope[0][k][j] * u1 - w.slope[1][k][j] * u0);
-            let turn = cross([w.y[0][j], w.y[1][j], w.y[2][j]], slope);
+            let turn = cross(&[w.y[0][j], w.y[1][j], w.y[2][j]], &slope);
             for k in 0..3 {
                 side[k][j] = turn[k];
                 side[k + 3][j] = slope[k];
@@ -259,17 +256,6 @@ impl InLanes {
             nats,
         }
     }
-}
-
-/// A symmetric matrix by the rows of its upper triangle.
-fn symmetric<const N: usize>(upper: &[f64]) -> SMatrix<f64, N, N> {
-    let mut matrix = SMatrix::zeros();
-    let entries = (0..N).flat_map(|a| (a..N).map(move |b| (a, b)));
-    for ((a, b), &entry) in entries.zip(upper) {
-        matrix[(a, b)] = entry;
-        matrix[(b, a)] = entry;
-    }
-    matrix
 }
 
 #[cfg(test)]
