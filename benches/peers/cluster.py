@@ -1,13 +1,12 @@
 """Pairs of a Parquet file through quest-cli, one process of Python, and Dask with two workers: the same bits, CPU time, a killed worker.
 
-    python benches/peers/cluster.py --cli target/release/quest-cli --pairs 10000
+    python benches/peers/cluster.py --cli target/release/quest-cli --pairs 100000
 
-Needs quest_pose with the extra `dask`. Each pair has 60 to 140 matches of a planted scene with 0.5 px of noise, 30 % of them
+Needs quest_pose with the extra `dask`, and quest-cli built with `--features parquet`. Each pair has 60 to 140 matches of a planted scene with 0.5 px of noise, 30 % of them
 false. CPU times (user and system) include the start of the processes; that of Dask is the sum of its workers, with the scheduler in brackets.
 """
 
 import argparse
-import json
 import os
 import resource
 import signal
@@ -17,7 +16,6 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -51,34 +49,15 @@ def planted(count: int, seed: int) -> pa.Table:
     return pa.table(columns)
 
 
-def as_lines(table: pa.Table, path: Path) -> None:
-    camera = {"model": "PINHOLE", "params": PARAMS}
-    with path.open("w") as file:
-        for row in table.to_pylist():
-            matches = [[*a, *b] for a, b in zip(row["x1"], row["x2"], strict=True)]
-            file.write(json.dumps({"camera1": camera, "matches": matches}) + "\n")
-
-
 def children() -> float:
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
 
-def of_lines(path: Path) -> list[tuple[Any, ...]]:
-    """What the tool and Python both say of a pair."""
-    rows = []
-    for line in path.open():
-        row = json.loads(line)
-        rows.append((row["model"], row.get("q_21"), row.get("t_21"), row.get("inliers"), row.get("iterations")))
-    return rows
-
-
-def of_blocks(files: list[Path]) -> list[tuple[Any, ...]]:
-    rows = pa.concat_tables([parquet.read_table(file) for file in files]).to_pylist()
-    return [
-        (row["model"], row["q_wxyz"], row["t"], row["inliers"] if row["t"] else None, row["iterations"] if row["t"] else None)
-        for row in rows
-    ]
+def of_files(files: list[Path]) -> pa.Table:
+    """The poses of blocks, all columns of them but the name that only the tool writes."""
+    table = pa.concat_tables([parquet.read_table(file) for file in files])
+    return table.drop_columns([name for name in table.column_names if name == "name"])
 
 
 ONE_PROCESS = """
@@ -125,7 +104,7 @@ def on_dask(source: Path, target: Path, rows: int, kill_after: int | None) -> tu
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cli", type=Path, default=Path("target/release/quest-cli"))
-    parser.add_argument("--pairs", type=int, default=10_000)
+    parser.add_argument("--pairs", type=int, default=100_000)
     parser.add_argument("--rows", type=int, default=1_000, help="of a block")
     parser.add_argument("--seed", type=int, default=6)
     parser.add_argument("--keep", type=Path, help="where the Parquet file goes; else it is deleted")
@@ -135,25 +114,25 @@ def main() -> None:
         source = arguments.keep or folder / "pairs.parquet"
         table = planted(arguments.pairs, arguments.seed)
         parquet.write_table(table, source, row_group_size=arguments.rows)
-        as_lines(table, folder / "pairs.jsonl")
 
         before = children()
-        run = [arguments.cli, "estimate", folder / "pairs.jsonl", "-o", folder / "tool.jsonl", "--threads", "1", "--quiet", "--threshold", "1"]
+        run = [arguments.cli, "estimate", source, "-o", folder / "tool.parquet", "--threads", "1", "--quiet", "--threshold", "1"]
+        # It ends with 1 where a pair has no pose.
         subprocess.run(run, check=False, stderr=subprocess.DEVNULL)
         print(f"tool: {children() - before:.2f} s")
-        expected = of_lines(folder / "tool.jsonl")
+        expected = of_files([folder / "tool.parquet"])
 
         (folder / "one").mkdir()
         before = children()
         subprocess.run([sys.executable, "-c", ONE_PROCESS, source, folder / "one", str(arguments.rows)], check=True)
         one = children() - before
-        same = of_blocks(sorted((folder / "one").glob("*.parquet"))) == expected
+        same = of_files(sorted((folder / "one").glob("*.parquet"))).equals(expected)
         print(f"one process: {one:.2f} s, the tool's bits: {same}")
 
         for kill_after in (None, arguments.pairs // arguments.rows // 3):
             target = folder / f"dask_{kill_after}"
             files, cpu, scheduler, there = on_dask(source, target, arguments.rows, kill_after)
-            same = of_blocks(files) == expected
+            same = of_files(files).equals(expected)
             left = len(list(target.iterdir())) - len(files)
             told = f", a worker killed after {there} of {len(files)} blocks, {left} unfinished file left" if kill_after else ""
             print(f"Dask: {cpu:.2f} s ({scheduler:.2f} s), {cpu / one - 1:+.1%}, the tool's bits: {same}{told}")

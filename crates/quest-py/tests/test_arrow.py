@@ -108,23 +108,76 @@ def test_other_forms_go_in_as_they_are() -> None:
             return table(rows).__arrow_c_stream__(requested_schema)
 
     assert arrow.estimate(Foreign()).to_pylist() == found
+    # Lists of any length, as pandas, Polars and Spark have them, and numbers of other kinds.
+    for kind in (pa.float64(), pa.float32(), pa.int32()):
+        lists = pa.list_(pa.list_(kind))
+        forms = pa.schema([f.with_type(lists) if f.name in ("x1", "x2") else f for f in arrow.schema_in()])
+        rounded = [row | {name: np.round(row[name]).tolist() for name in ("x1", "x2")} for row in rows]
+        expected = arrow.estimate(table(rounded)).to_pylist()
+        assert arrow.estimate(pa.Table.from_pylist(rounded, schema=forms)).to_pylist() == expected
     # Without keys the number of the row is the key.
     plain = table(rows).select(["x1", "x2"])
     one = arrow.estimate(plain, threshold=500.0, max_iterations=300, max_false_alarms=np.inf, first_index=5)
     assert one.column("pair").to_pylist() == [5, 6, 7]
 
 
-def shortened(t: Any) -> Any:
-    compute = pytest.importorskip("pyarrow.compute")
-    return t.set_column(2, "x2", compute.list_slice(t.column("x2"), 0, 3))
+def spoiled(rows: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Rows each of which is no pair in another way, but for the last, and a word of the reason of each."""
+    faults: list[tuple[dict[str, Any], str]] = [
+        ({"x1": None}, "x1: found null"),
+        ({"x2": rows[1]["x2"][1:]}, "x2: found 20 points, expected 21"),
+        ({"x2": [*rows[2]["x2"][:-1], None]}, "x2: found a point of 0 numbers"),
+        ({"x1": [*rows[3]["x1"][:-1], [1.0, 2.0, 3.0]]}, "x1: found a point of 3 numbers"),
+        ({"score": rows[5]["score"][1:]}, "score: found 24 scores, expected 25"),
+        ({"score": [float("nan"), *rows[6]["score"][1:]]}, "score: found"),
+        ({"camera1": "FISH"}, "FISH"),
+        ({"params2": [1.0]}, "PINHOLE"),
+        ({"params1": None}, "params1: found"),
+    ]
+    places = [0, 1, 2, 3, 5, 6, 7, 8, 9]
+    made = [dict(row) for row in rows]
+    words = [""] * len(rows)
+    for place, (change, word) in zip(places, faults, strict=True):
+        made[place] |= change
+        words[place] = word
+    return made, words
+
+
+def of_any_length(rows: list[dict[str, Any]]) -> Any:
+    pa = pytest.importorskip("pyarrow")
+    points = pa.list_(pa.list_(pa.float64()))
+    schema = pa.schema([f.with_type(points) if f.name in ("x1", "x2") else f for f in arrow.schema_in()])
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def test_a_row_that_is_no_pair_costs_no_other_its_pose() -> None:
+    rows, words = spoiled(pairs(13))
+    rows[10] |= {"score": None}
+    rows[11] |= {"camera2": None}
+    rows[12] |= {"x1": [*rows[12]["x1"][:-1], [None, 1.0]]}
+    found = arrow.estimate(of_any_length(rows))
+    assert found.schema == arrow.schema_out()
+    for k, (one, word) in enumerate(zip(found.to_pylist(), words, strict=True)):
+        assert one["pair"] == rows[k]["pair"]
+        if k == 4:
+            assert "found 3 matches" in one["reason"]
+        elif word:
+            assert word in one["reason"]
+            assert (one["q_wxyz"], one["t"], one["model"], one["inliers"]) == (None, None, None, [])
+        else:
+            assert one["q_wxyz"] is not None
+    whole = [k for k, word in enumerate(words) if not word]
+    assert arrow.estimate(of_any_length([rows[k] for k in whole])).to_pylist() == [found.to_pylist()[k] for k in whole]
+    assert [row["invalid_count"] for row in found.to_pylist()] == [0] * 12 + [1]
 
 
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         (lambda t: t.drop_columns(["x2"]), "x2"),
-        (lambda t: t.set_column(1, "x1", t.column("score")), "fixed_size_list"),
-        (shortened, "differ in length"),
+        (lambda t: t.set_column(1, "x1", t.column("score")), "expected lists of points"),
+        (lambda t: t.set_column(7, "score", t.column("x1")), "expected lists of numbers"),
+        (lambda t: t.set_column(0, "pair", t.column("camera1")), "expected whole numbers"),
         (lambda t: t.drop_columns(["params1"]), "params1"),
     ],
 )
@@ -215,23 +268,20 @@ def test_the_tool_has_the_same_columns_and_bits(tmp_path: Path) -> None:
 
 def test_the_tool_says_what_a_pair_lacks(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
-    pa = pytest.importorskip("pyarrow")
-    rows = pairs(7)
-    rows[1] |= {"x1": None}
-    rows[2] |= {"x2": [*rows[2]["x2"][:-1], [None, 1.0]]}
-    rows[5] |= {"x2": rows[5]["x2"][1:]}
-    parquet.write_table(pa.Table.from_pylist(rows, schema=arrow.schema_in()), tmp_path / "pairs.parquet")
+    rows, words = spoiled(pairs(13))
+    rows[10] |= {"score": None}
+    rows[11] |= {"camera2": None}
+    rows[12] |= {"x1": [*rows[12]["x1"][:-1], [None, 1.0]]}
+    parquet.write_table(of_any_length(rows), tmp_path / "pairs.parquet")
     with pytest.raises(subprocess.CalledProcessError) as error:
         tool("estimate", tmp_path / "pairs.parquet", "-o", tmp_path / "poses.parquet")
     assert error.value.returncode == 1
-    found = parquet.read_table(tmp_path / "poses.parquet").to_pylist()
-    assert [row["pair"] for row in found] == [row["pair"] for row in rows]
-    assert [row["q_wxyz"] is None for row in found] == [False, True, False, False, True, True, False]
-    assert [row["invalid_count"] for row in found] == [0, 0, 1, 0, 0, 0, 0]
-    assert "x1: found null" in found[1]["reason"]
-    assert "found 3 matches" in found[4]["reason"]
+    found = parquet.read_table(tmp_path / "poses.parquet").drop_columns("name").to_pylist()
+    for k, (one, expected, word) in enumerate(zip(found, arrow.estimate(of_any_length(rows)).to_pylist(), words, strict=True)):
+        reasons = one.pop("reason"), expected.pop("reason")
+        assert one == expected, k
+        assert all(word in (reason or "") for reason in reasons), k
     assert found[4]["inliers"] == [False] * 3
-    assert "x2: found 24 points, expected 25" in found[5]["reason"]
 
 
 def test_the_tool_exports_what_is_read_here(tmp_path: Path) -> None:
@@ -249,7 +299,8 @@ def test_the_tool_exports_what_is_read_here(tmp_path: Path) -> None:
 
 def test_pyarrow_is_needed_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ImportError):
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(ImportError, match=r"pip install quest-pose\[arrow\]"):
         arrow.estimate([])
-    with pytest.raises(ImportError):
+    with pytest.raises(ImportError, match=r"pip install quest-pose\[arrow\]"):
         dask.estimate_parquet(None, "a", "b")

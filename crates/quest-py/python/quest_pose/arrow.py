@@ -7,20 +7,24 @@ Columns in
 ----------
 ======================= ================================== ==========================================================
 pair                    uint64 or int64, optional          the key of the pair, which seeds its search; else the row
-x1, x2                  list of fixed-size list of 2       the points of its matches, float32 or float64
+x1, x2                  list of lists of 2                 the points of its matches, numbers of any kind
 camera1, camera2        string, optional                   COLMAP's name of the model; camera1 where camera2 is absent
 params1, params2        list of double, with the cameras   COLMAP's parameters
-score                   list of float, optional            one a match, higher is better
+score                   list of numbers, optional          one a match, higher is better
 ======================= ================================== ==========================================================
 
-Other columns are left out. Columns out: ``schema_out()``.
+Other columns are left out. Columns out: ``schema_out()``. A row that is no pair (a null, lists of different lengths, a model of a
+camera that does not exist) has no pose and a ``reason``, and costs no other row its own. A number that is null is a NaN: its match
+has no bearing. A pair without a key has the number of its row.
 """
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quest_pose._core import Camera, EstimateBatch, QuestError, estimate_batch
+from quest_pose._arrow_rows import Rows
+from quest_pose._arrow_rows import pyarrow as needed
+from quest_pose._core import EstimateBatch, QuestError, estimate_batch
 
 if TYPE_CHECKING:
     import pyarrow
@@ -30,7 +34,7 @@ __all__ = ["estimate", "schema_in", "schema_out"]
 
 def schema_in() -> "pyarrow.Schema":
     """The columns of ``estimate``, as they are read without a copy."""
-    import pyarrow as pa
+    pa = needed()
 
     points = pa.list_(pa.list_(pa.float64(), 2))
     return pa.schema(
@@ -49,7 +53,7 @@ def schema_in() -> "pyarrow.Schema":
 
 def schema_out() -> "pyarrow.Schema":
     """The columns that ``estimate`` returns: null where a pair has no pose, and then its ``reason``."""
-    import pyarrow as pa
+    pa = needed()
 
     def vector(size: int) -> Any:
         return pa.list_(pa.float64(), size)
@@ -101,32 +105,28 @@ def estimate(batch: Any, *, num_threads: int = 1, **options: Any) -> "pyarrow.Re
     ImportError
         Without pyarrow.
     QuestError
-        For a column that is missing or of another form, and as ``estimate_batch``.
+        For a column that is missing or of another form, and as ``estimate_batch``. A single row costs its own pose alone.
     """
-    import pyarrow as pa
+    pa = needed()
 
-    table = _table(pa, batch)
-    x1, offsets = _points(table, "x1")
-    x2, others = _points(table, "x2")
-    if not np.array_equal(offsets, others):
-        raise QuestError("the lists of x1 and x2 differ in length, expected as many points in both")
-    names = set(table.column_names)
-    if "pair" in names:
-        options["indices"] = np.asarray(_column(table, "pair"))
-    if "score" in names:
-        scores, lengths = _lists(table, "score")
-        if not np.array_equal(lengths, offsets):
-            raise QuestError("the lists of score differ in length from those of x1, expected one a match")
-        options["scores"] = scores
-    if "camera1" in names:
-        options["cameras1"] = cameras = _cameras(table, "camera1", "params1")
-        options["cameras2"] = _cameras(table, "camera2", "params2") if "camera2" in names else cameras
-        if table.num_rows == 0:
-            options |= {"cameras1": None, "cameras2": None, "threshold": options.get("threshold") or 1.0}
-    found = estimate_batch(x1, x2, offsets, num_threads=num_threads, **options)
-    first = int(options.get("first_index", 0))
-    keys = options.get("indices", np.arange(first, first + len(found), dtype=np.uint64))
-    return _record_batch(pa, np.asarray(keys, dtype=np.uint64), found)
+    rows = Rows(_table(pa, batch), int(options.pop("first_index", 0)))
+    batches, places = [], []
+    # Scores are given to all pairs of a batch or to none. The other pairs of a batch change no answer.
+    for has_score in (False, True):
+        chosen = np.flatnonzero(rows.is_pair & (rows.has_score == has_score))
+        if len(chosen):
+            x1, x2, offsets, others = rows.arrays(chosen)
+            found = estimate_batch(x1, x2, offsets, num_threads=num_threads, **options | others)
+            batches.append(_record_batch(pa, rows.keys[chosen], found))
+            places.append(chosen)
+    refused = np.flatnonzero(~rows.is_pair)
+    batches.append(_without_pose(pa, rows.keys[refused], [rows.reasons[k] for k in refused]))
+    places.append(refused)
+    all_rows = pa.Table.from_batches(batches)
+    if any(0 < len(chosen) < len(rows.keys) for chosen in places):
+        all_rows = all_rows.take(np.argsort(np.concatenate(places)))
+    whole = all_rows.combine_chunks().to_batches()
+    return whole[0] if whole else batches[0]
 
 
 def _table(pa: Any, batch: Any) -> Any:
@@ -141,50 +141,14 @@ def _table(pa: Any, batch: Any) -> Any:
     raise QuestError(f"found {type(batch).__name__}, expected a record batch or a table of Arrow")
 
 
-def _column(table: Any, name: str) -> Any:
-    if name not in table.column_names:
-        raise QuestError(f"found the columns {table.column_names}, expected also {name}")
-    column = table.column(name).combine_chunks()
-    if column.null_count:
-        raise QuestError(f"the column {name} holds {column.null_count} nulls, expected none")
-    return column
-
-
-def _lists(table: Any, name: str) -> tuple[Any, Any]:
-    """The numbers of a column of lists, and where each list begins."""
-    import pyarrow as pa
-
-    column = _column(table, name)
-    if not (pa.types.is_list(column.type) or pa.types.is_large_list(column.type)):
-        raise QuestError(f"the column {name} is of {column.type}, expected lists")
-    offsets = np.asarray(column.offsets, dtype=np.int64)
-    values = column.values.slice(offsets[0], offsets[-1] - offsets[0]) if len(column) else column.values.slice(0, 0)
-    return values, offsets - offsets[0] if len(column) else np.zeros(1, np.int64)
-
-
-def _points(table: Any, name: str) -> tuple[Any, Any]:
-    """The points of a column of lists of points, and where each list begins."""
-    values, offsets = _lists(table, name)
-    if getattr(values.type, "list_size", None) not in (2, 3):
-        raise QuestError(f"the points of {name} are of {values.type}, expected fixed_size_list[2] of numbers")
-    width = values.type.list_size
-    numbers = np.asarray(values.flatten(), dtype=np.float64).reshape(-1, width)
-    return numbers, offsets
-
-
-def _cameras(table: Any, model: str, params: str) -> list[Camera]:
-    """A camera a row; equal ones are made once."""
-    names = _column(table, model).to_pylist()
-    numbers, offsets = _lists(table, params)
-    numbers = np.asarray(numbers, dtype=np.float64)
-    made: dict[tuple[str, bytes], Camera] = {}
-    cameras = []
-    for name, a, b in zip(names, offsets[:-1], offsets[1:], strict=True):
-        key = name, numbers[a:b].tobytes()
-        if key not in made:
-            made[key] = Camera(name, numbers[a:b])
-        cameras.append(made[key])
-    return cameras
+def _without_pose(pa: Any, keys: Any, reasons: list[str]) -> Any:
+    """Rows that are no pairs, and why."""
+    counts = {"inlier_count", "invalid_count", "iterations", "unmoved"}
+    rows = [
+        {"pair": key, "reason": reason, "inliers": []} | dict.fromkeys(counts, 0)
+        for key, reason in zip(keys.tolist(), reasons, strict=True)
+    ]
+    return pa.RecordBatch.from_pylist(rows, schema=schema_out())
 
 
 def _record_batch(pa: Any, keys: Any, found: EstimateBatch) -> Any:

@@ -9,6 +9,9 @@ import os
 from pathlib import Path
 from typing import Any
 
+from quest_pose import arrow
+from quest_pose._arrow_rows import pyarrow
+
 __all__ = ["estimate_block", "estimate_parquet"]
 
 
@@ -48,11 +51,12 @@ def estimate_parquet(
 
     Raises
     ------
+    ImportError
+        Without pyarrow.
     QuestError
         For a source without the columns.
     """
-    import pyarrow.parquet as parquet
-
+    parquet = pyarrow("pyarrow.parquet")
     source, target = Path(source), Path(target)
     target.mkdir(parents=True, exist_ok=True)
     files = sorted(source.glob("*.parquet")) if source.is_dir() else [source]
@@ -85,17 +89,12 @@ def estimate_block(
     str
         The file.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as parquet
-
-    from quest_pose import arrow
-
+    pa, parquet = pyarrow(), pyarrow("pyarrow.parquet")
     target = Path(target)
     if target.exists():
         return str(target)
     table = _rows(parquet.ParquetFile(source), first, rows)
-    if "pair" not in table.column_names:
-        options.setdefault("first_index", first)
+    options.setdefault("first_index", first)
     found = arrow.estimate(table, num_threads=num_threads, **options)
     # Of this process alone: two workers that were given the same block do not meet.
     part = target.with_name(f".{target.name}.{os.getpid()}")

@@ -108,7 +108,8 @@ pub(crate) fn report(
     Some(Estimate {
         model,
         pose,
-        covariance,
+        // Rounding differs on the two sides of the diagonal.
+        covariance: covariance.symmetric_part(),
         inlier_count: inliers.len(),
         inliers: mask(observations, inliers),
         score: share(&polished.pose.scored, observations),
