@@ -49,6 +49,7 @@ pub(crate) trait ComplexNumber: Number {
 }
 
 /// The vector product, without a conjugate.
+#[expect(clippy::inline_always, reason = "a call would leave the instructions of the lanes")]
 #[inline(always)]
 pub(crate) fn cross<T: Number>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
