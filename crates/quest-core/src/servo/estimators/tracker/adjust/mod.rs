@@ -129,7 +129,13 @@ impl Workspace {
                 new.variance = feature.inverse[5];
                 new.is_mapped = true;
             } else if survey.known[i].is_none() {
-                new.rho = normal.x * survey.goal[i][0] + normal.y * survey.goal[i][1] + normal.z;
+                // No key image shows it any more: it lies on the plane, or keeps what was learnt of its depth.
+                let on_plane = normal.x * survey.goal[i][0] + normal.y * survey.goal[i][1] + normal.z;
+                match (map.is_planar(), point.is_mapped) {
+                    (true, true) => (new.rho, new.variance) = (on_plane, map.relief * map.relief),
+                    (false, true) => {}
+                    (_, false) => new.rho = on_plane,
+                }
             }
             self.trial_points[i] = new;
         }
@@ -146,4 +152,76 @@ pub(crate) fn solve(l: &[f64], b: &mut [f64]) {
         b[i] = (b[i] - done) / l[i * n + i];
     }
     cholesky::solve_upper(l, b);
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::servo::estimators::tracker::map::PLANE_RELIEF;
+
+    /// The goal's features of a scene with relief, one key image of all but the first, and the map that the truth is.
+    fn scene(relief: f64) -> (Vec<[f64; 2]>, KeyImage, Map) {
+        let goal: Vec<[f64; 2]> =
+            (0..16).map(|k| f64::from(k)).map(|k| [0.4 * (2.1 * k).sin(), 0.3 * (3.7 * k).cos()]).collect();
+        let pose = RelativePose::new(
+            UnitQuaternion::new(Vector3::new(0.02, -0.05, 0.03)),
+            Vector3::new(0.1, -0.04, 0.06),
+        );
+        let mut map = Map::new(&goal, 1, relief);
+        map.keys.push(pose);
+        for (k, point) in map.points.iter_mut().enumerate() {
+            point.rho = 1.0 + 0.1 * (1.9 * k as f64).sin();
+            (point.variance, point.is_mapped) = (1e-4, true);
+        }
+        let seen = |point: &Point| {
+            let x2 = pose.q_21 * Vector3::new(point.place[0], point.place[1], 1.0) + pose.t_21 * point.rho;
+            Some([x2.x / x2.z, x2.y / x2.z])
+        };
+        let mut frame: Vec<_> = map.points.iter().map(seen).collect();
+        frame[0] = None;
+        (goal, KeyImage { frame, variance: 1e-6 }, map)
+    }
+
+    fn stepped(relief: f64, learnt: impl Fn(&mut Point)) -> Map {
+        let (goal, key, mut map) = scene(relief);
+        learnt(&mut map.points[0]);
+        // Away from the minimum, so that the step falls.
+        map.keys[0].t_21.x += 1e-3;
+        let known = vec![None; goal.len()];
+        let survey = Survey {
+            goal: &goal,
+            known: &known,
+            keys: &[key],
+            goal_variance: 1e-6,
+            ground: None,
+            chosen: &[],
+        };
+        assert!(Workspace::new(goal.len(), 1).step(&mut map, &survey));
+        map
+    }
+
+    /// Three key images do not show all features at once: what an earlier one told stays.
+    #[test]
+    fn a_feature_that_no_key_image_shows_any_more_keeps_its_depth() {
+        let map = stepped(0.3, |point| point.rho = 0.7);
+        let Point { rho, variance, is_mapped, .. } = map.points[0];
+        assert_eq!((rho, variance, is_mapped), (0.7, 1e-4, true));
+    }
+
+    /// It was seen as a wrong match once; the plane knows better where it is.
+    #[test]
+    fn on_a_plane_it_lies_on_the_plane() {
+        let map = stepped(PLANE_RELIEF, |point| (point.rho, point.variance) = (0.7, 0.09));
+        assert_eq!(map.points[0].rho, map.on_plane(map.points[0].place));
+        assert_eq!(map.points[0].variance, PLANE_RELIEF * PLANE_RELIEF);
+    }
+
+    #[test]
+    fn one_that_was_never_seen_lies_on_the_plane_and_is_as_uncertain_as_before() {
+        let map = stepped(0.3, |point| (point.variance, point.is_mapped) = (0.09, false));
+        assert_eq!(map.points[0].rho, map.on_plane(map.points[0].place));
+        assert_eq!((map.points[0].variance, map.points[0].is_mapped), (0.09, false));
+    }
 }
