@@ -164,7 +164,7 @@ mod tests {
     /// The goal's features of a scene with relief, one key image of all but the first, and the map that the truth is.
     fn scene(relief: f64) -> (Vec<[f64; 2]>, KeyImage, Map) {
         let goal: Vec<[f64; 2]> =
-            (0..16).map(|k| f64::from(k)).map(|k| [0.4 * (2.1 * k).sin(), 0.3 * (3.7 * k).cos()]).collect();
+            (0..16).map(f64::from).map(|k| [0.4 * (2.1 * k).sin(), 0.3 * (3.7 * k).cos()]).collect();
         let pose = RelativePose::new(
             UnitQuaternion::new(Vector3::new(0.02, -0.05, 0.03)),
             Vector3::new(0.1, -0.04, 0.06),
@@ -202,26 +202,28 @@ mod tests {
         map
     }
 
+    fn assert_is(point: &Point, rho: f64, variance: f64) {
+        assert!((point.rho - rho).abs() < 1e-15 && (point.variance - variance).abs() < 1e-15, "{point:?}");
+    }
+
     /// Three key images do not show all features at once: what an earlier one told stays.
     #[test]
     fn a_feature_that_no_key_image_shows_any_more_keeps_its_depth() {
         let map = stepped(0.3, |point| point.rho = 0.7);
-        let Point { rho, variance, is_mapped, .. } = map.points[0];
-        assert_eq!((rho, variance, is_mapped), (0.7, 1e-4, true));
+        assert_is(&map.points[0], 0.7, 1e-4);
     }
 
     /// It was seen as a wrong match once; the plane knows better where it is.
     #[test]
     fn on_a_plane_it_lies_on_the_plane() {
         let map = stepped(PLANE_RELIEF, |point| (point.rho, point.variance) = (0.7, 0.09));
-        assert_eq!(map.points[0].rho, map.on_plane(map.points[0].place));
-        assert_eq!(map.points[0].variance, PLANE_RELIEF * PLANE_RELIEF);
+        assert_is(&map.points[0], map.on_plane(map.points[0].place), PLANE_RELIEF * PLANE_RELIEF);
     }
 
     #[test]
     fn one_that_was_never_seen_lies_on_the_plane_and_is_as_uncertain_as_before() {
         let map = stepped(0.3, |point| (point.variance, point.is_mapped) = (0.09, false));
-        assert_eq!(map.points[0].rho, map.on_plane(map.points[0].place));
-        assert_eq!((map.points[0].variance, map.points[0].is_mapped), (0.09, false));
+        assert_is(&map.points[0], map.on_plane(map.points[0].place), 0.09);
+        assert!(!map.points[0].is_mapped);
     }
 }
