@@ -49,9 +49,11 @@ Results:
   The model is general, planar or pure_rotation (no translation that stands clear of the noise);
   the evidence is the median residual of the inliers under each. A plane may have a second pose that the
   noise does not rule out, the runner-up, and so may a camera that hardly moved.
+  In the table `about` is the axis of the rotation, `score` how well the pose explains all matches, from 0 to 1, and the
+  noise the standard deviation of the inliers' errors.
   Matches that determine no pose, such as points on a line, are bad input. Among several pairs their model is
   degenerate, with a reason and without a pose. No line and no file stops the others: one that cannot be
-  read gets a record with its reason. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
+  read gets a record with its reason, in CSV in the last column. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
   at the end; --resume goes on after the records that are there.
   A pixel without a viewing ray is an outlier, and so is a match with a coordinate that is NaN, infinite or
   missing (null in JSON, an empty field in CSV). invalid_count tells how many there are.
@@ -164,7 +166,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 impl Estimated {
     /// A line or a file that is no pair.
     fn unreadable(key: u64, Unread { name, error }: Unread) -> Self {
-        let heading = words::one_line(&format!("{}: no pose", error.place));
+        let called = name.clone().unwrap_or_else(|| error.place.to_string());
+        let heading = words::one_line(&format!("{called}: no pose"));
         let record = EstimateRecord { key, ..EstimateRecord::unanswered(name, error.to_string()) };
         Self { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)) }
     }

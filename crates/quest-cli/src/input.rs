@@ -24,7 +24,7 @@ pub(crate) struct ReadingOptions {
     points2: Option<PathBuf>,
     /// The camera of view 1, and of view 2 if `--camera2` is absent. It replaces the cameras of the file. FILE is a calibration of
     /// OpenCV (YAML, XML) or ROS (`camera_info`), or COLMAP's `cameras.txt` or `cameras.bin`; `FILE:ID` is one of its cameras.
-    #[arg(long, value_name = "MODEL,w,h,params|FILE[:ID]", value_parser = parse_camera)]
+    #[arg(long, visible_alias = "camera", value_name = "MODEL,w,h,params|FILE[:ID]", value_parser = parse_camera)]
     camera1: Option<Camera>,
     /// The camera of view 2. It replaces the camera of the file.
     #[arg(long, value_name = "MODEL,w,h,params|FILE[:ID]", value_parser = parse_camera)]

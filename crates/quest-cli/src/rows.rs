@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use quest_io::{CandidateRecord, EstimateRecord, SolveRecord};
 use serde::Serialize;
 
+use crate::words;
+
 /// One line of JSON.
 pub(crate) fn write_line<T: Serialize>(writer: &mut dyn Write, record: &T) -> io::Result<()> {
     // In one piece, so that a reader of the pipe never sees half a line.
@@ -98,7 +100,7 @@ fn row(pair: usize, number: usize, record: &SolveRecord, c: &CandidateRecord) ->
 }
 
 /// The columns of [`write_estimate`]. Only JSON has the inliers and the covariance.
-const ESTIMATE_COLUMNS: [&str; 18] = [
+const ESTIMATE_COLUMNS: [&str; 19] = [
     "pair",
     "name",
     "model",
@@ -117,10 +119,11 @@ const ESTIMATE_COLUMNS: [&str; 18] = [
     "elapsed_ms",
     "rotation_error_deg",
     "translation_error_deg",
+    "reason",
 ];
 
-/// One row of CSV for the estimate of the pair with number `pair`, counted from one. Fields are empty if there is no pose. The
-/// header comes before the row of the first pair.
+/// One row of CSV for the estimate of the pair with number `pair`, counted from one. Without a pose
+/// they are empty but for the reason. The header comes before the row of the first pair.
 pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &EstimateRecord) -> io::Result<()> {
     let mut row = vec![
         pair.to_string(),
@@ -140,6 +143,7 @@ pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &Estim
     for error in [record.rotation_error_deg, record.translation_error_deg] {
         row.push(error.map(text).unwrap_or_default());
     }
+    row.push(record.reason.as_deref().map(words::one_line).unwrap_or_default());
     write_rows(writer, header(pair, ESTIMATE_COLUMNS).into_iter().chain([row]))
 }
 

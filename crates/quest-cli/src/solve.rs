@@ -53,7 +53,9 @@ Files:
     scores if there are any.
   Points of one image a file, CSV or .npy of N x 2: FILE --points2 FILE.
   Without cameras the points are on the plane z = 1.
-  Cameras: an argument MODEL,width,height,params by COLMAP's names and order, or a file. OpenCV's YAML and XML have
+  Cameras: an argument MODEL,width,height,params by COLMAP's names and order, or a file. The params are fx,fy,cx,cy of
+    PINHOLE, with k1,k2,p1,p2 after them of OPENCV, and with k1,k2,p1,p2,k3,k4,k5,k6 of FULL_OPENCV: five coefficients
+    of OpenCV's are FULL_OPENCV with 0,0,0 at the end. A wrong number of them is an error that names them. OpenCV's YAML and XML have
     camera_matrix or K, distortion_coefficients or D, fisheye_model: 1 for a fisheye; ROS's camera_info has a
     distortion_model; of several cameras FILE:ID takes K1 and D1 by ID 1, left: {K: .., D: ..} by ID left, and
     COLMAP's by their numbers.
@@ -185,7 +187,8 @@ impl Arguments {
 
     /// The record of a line or a file that is no pair, or has matches that cannot be solved.
     fn unreadable(&self, Unread { name, error }: Unread) -> Solved {
-        let heading = words::one_line(&format!("{}: no pose", error.place));
+        let called = name.clone().unwrap_or_else(|| error.place.to_string());
+        let heading = words::one_line(&format!("{called}: no pose"));
         let record = SolveRecord::unanswered(name, self.solver_name(), error.to_string());
         Solved { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)), note: None }
     }

@@ -76,11 +76,13 @@ fn cameras_may_come_from_the_command_line() {
         rows.iter().map(|m| numbers(m).iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
     let directory = directory_with("pixels.csv", format!("u1,v1,u2,v2\n{}\n", rows.join("\n")));
     let camera = "PINHOLE,1306,979,1135.435732,1135.435732,652.3,489.1";
-    let arguments = ["solve", "pixels.csv", "--format", "json", "--camera1", camera];
-    let run = run_in(directory.path(), &arguments, b"");
-    let from_csv: Value = serde_json::from_str(&run.stdout).unwrap();
     let (_, from_json) = solved(&[&example("tiny_berlin_7in.json")]);
-    assert_eq!(candidates(&from_csv)[0]["t_21"], candidates(&from_json)[0]["t_21"]);
+    for option in ["--camera1", "--camera"] {
+        let arguments = ["solve", "pixels.csv", "--format", "json", option, camera];
+        let run = run_in(directory.path(), &arguments, b"");
+        let from_csv: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(candidates(&from_csv)[0]["t_21"], candidates(&from_json)[0]["t_21"]);
+    }
 }
 
 #[test]

@@ -48,6 +48,26 @@ fn a_bad_file_costs_itself_alone() {
 }
 
 #[test]
+fn every_format_says_which_file_failed() {
+    let folder = folder();
+    let files = ["no.csv", "c.json", "a.csv", "--quiet"];
+    let csv = run_in(
+        folder.path(),
+        &[&["estimate", "--threshold", "1e-6", "--format", "csv"], &files[..]].concat(),
+        b"",
+    );
+    let rows: Vec<_> = csv.stdout.lines().collect();
+    assert!(rows[0].starts_with("pair,name,model,") && rows[0].ends_with(",reason"), "{}", rows[0]);
+    assert!(rows[1].starts_with("1,no.csv,,") && rows[1].contains(",no.csv: cannot be read"), "{}", rows[1]);
+    assert!(rows[2].starts_with("2,c.json,,") && rows[2].contains("c.json:1:1: "), "{}", rows[2]);
+    assert!(rows[3].ends_with(','), "{}", rows[3]);
+    for command in [&["estimate", "--threshold", "1e-6"][..], &["solve"]] {
+        let run = run_in(folder.path(), &[command, &["--format", "table"], &files].concat(), b"");
+        assert!(run.stdout.starts_with("no.csv: no pose\n\nc.json: no pose\n\n"), "{}", run.stdout);
+    }
+}
+
+#[test]
 fn folders_and_patterns_are_read_by_name() {
     let folder = folder();
     let path = folder.path().to_str().unwrap().to_owned();
