@@ -23,8 +23,8 @@ use crate::errors::QuestError;
 /// Parameters
 /// ----------
 /// goal : array_like of shape (N, 2)
-///     The features in the goal image, at least five: pixels where a camera is given, otherwise points on the plane
-///     z = 1.
+///     The features in the goal image, at least five and none of them NaN: pixels where a camera is given, otherwise points
+///     on the plane z = 1.
 /// camera : Camera or array_like of shape (3, 3), optional
 ///     The camera, or its matrix K.
 /// max_speed, max_turn_rate : float
@@ -160,8 +160,8 @@ fn named_axes(names: &[String]) -> PyResult<Axes> {
 /// Parameters
 /// ----------
 /// goal : array_like of shape (N, 2)
-///     The features in the goal image, at least five: pixels where a camera is given, otherwise points on the plane
-///     z = 1.
+///     The features in the goal image, at least five and none of them NaN: pixels where a camera is given, otherwise points
+///     on the plane z = 1.
 /// camera : Camera or array_like of shape (3, 3), optional
 ///     The camera, or its matrix K. With the size of its image the robot keeps features inside.
 /// max_speed, max_turn_rate : float

@@ -213,10 +213,15 @@ fn goal_points(
         let found = points.len();
         return Err(TooFewMatches::new_err(format!("goal has {found} features, expected at least {needed}")));
     }
-    let goal: Option<Vec<[f64; 2]>> = points.iter().map(|&p| point_on_plane(camera, p)).collect();
-    goal.ok_or_else(|| {
-        NotFinite::new_err("a feature of goal is not finite or has no viewing ray, expected one in front")
-    })
+    let on_plane = |(row, &[u, v]): (usize, &[f64; 2])| {
+        point_on_plane(camera, [u, v]).ok_or_else(|| {
+            NotFinite::new_err(format!(
+                "row {row} of goal is ({u}, {v}), which is not finite or has no viewing ray in front; expected every \
+                 feature to be seen in the goal image: leave the others out, and their rows of later images"
+            ))
+        })
+    };
+    points.iter().enumerate().map(on_plane).collect()
 }
 
 /// Limits and guards.
