@@ -55,10 +55,10 @@ Files:
   Without cameras the points are on the plane z = 1.
   Cameras: an argument MODEL,width,height,params by COLMAP's names and order, or a file. The params are fx,fy,cx,cy of
     PINHOLE, with k1,k2,p1,p2 after them of OPENCV, and with k1,k2,p1,p2,k3,k4,k5,k6 of FULL_OPENCV: five coefficients
-    of OpenCV's are FULL_OPENCV with 0,0,0 at the end. A wrong number of them is an error that names them. OpenCV's YAML and XML have
-    camera_matrix or K, distortion_coefficients or D, fisheye_model: 1 for a fisheye; ROS's camera_info has a
-    distortion_model; of several cameras FILE:ID takes K1 and D1 by ID 1, left: {K: .., D: ..} by ID left, and
-    COLMAP's by their numbers.
+    of OpenCV's are FULL_OPENCV with 0,0,0 at the end. A wrong number of them is an error that names them.
+    OpenCV's YAML and XML have camera_matrix or K, distortion_coefficients or D, fisheye_model: 1 for a fisheye;
+    ROS's camera_info has a distortion_model; of several cameras FILE:ID takes K1 and D1 by ID 1,
+    left: {K: .., D: ..} by ID left, and COLMAP's by their numbers.
   Several files, folders and patterns are read one after the other; the name of a file stands for the name
   of a pair that has none.
 
