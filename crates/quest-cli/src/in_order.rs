@@ -5,6 +5,8 @@ use std::sync::Mutex;
 use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread;
 
+use quest_core::robust::STACK_SIZE;
+
 /// Results, for each thread, that may wait for an earlier one.
 const AHEAD: usize = 16;
 
@@ -45,7 +47,7 @@ fn by_threads<T: Send, R: Send, E: Send>(
         let writer = thread::Builder::new().spawn_scoped(scope, move || {
             results.into_iter().filter_map(|result| result.recv().ok()).try_for_each(sink)
         });
-        let start = |_| thread::Builder::new().spawn_scoped(scope, worker).ok();
+        let start = |_| thread::Builder::new().stack_size(STACK_SIZE).spawn_scoped(scope, worker).ok();
         let workers = (0..threads).map_while(start).count();
         let Some(writer) = writer.ok().filter(|_| workers > 0) else {
             drop((to_workers, to_sink));

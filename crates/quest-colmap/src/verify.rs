@@ -10,7 +10,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
-use quest_core::robust::{EstimateError, Options};
+use quest_core::robust::{EstimateError, Options, STACK_SIZE};
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -172,7 +172,7 @@ fn pool(threads: usize) -> Result<Option<ThreadPool>, ColmapError> {
     if threads == 1 {
         return Ok(None);
     }
-    let built = ThreadPoolBuilder::new().num_threads(threads).build();
+    let built = ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK_SIZE).build();
     built.map(Some).map_err(|_| ColmapError::Threads(threads))
 }
 

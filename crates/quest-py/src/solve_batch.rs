@@ -7,6 +7,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use quest_core::lanes::{BatchSolver, Essentials, Tolerance};
+use quest_core::robust::STACK_SIZE;
 use quest_core::{Candidates, Correspondence, InputError};
 
 use crate::arrays::{self, Samples};
@@ -102,7 +103,7 @@ fn solve_parts<const D: usize>(
         let chunks = x1.chunks(share).zip(x2.chunks(share)).enumerate();
         let start = |(part, (x1, x2))| {
             let work = move || solve_part(part * share, x1, x2, make, is_cancelled);
-            (work, thread::Builder::new().spawn_scoped(scope, work))
+            (work, thread::Builder::new().stack_size(STACK_SIZE).spawn_scoped(scope, work))
         };
         let running: Vec<_> = chunks.map(start).collect();
         // A part whose thread was refused is done here.

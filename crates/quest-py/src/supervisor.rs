@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
+use quest_core::robust::STACK_SIZE;
 
 use crate::errors::QuestError;
 
@@ -22,7 +23,7 @@ pub(crate) fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static
     let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
     let (sender, result) = mpsc::sync_channel(1);
     let theirs = Arc::clone(&work);
-    let start = thread::Builder::new().spawn(move || {
+    let start = thread::Builder::new().stack_size(STACK_SIZE).spawn(move || {
         if let Some(work) = take(&theirs) {
             // Nobody waits for it any more after a signal.
             let _ = sender.send(work());
@@ -85,7 +86,7 @@ impl<'a> Supervisor<'a> {
         let work = Mutex::new(Some(work));
         let take = || work.lock().unwrap_or_else(PoisonError::into_inner).take();
         let result = thread::scope(|scope| {
-            let start = thread::Builder::new().spawn_scoped(scope, || {
+            let start = thread::Builder::new().stack_size(STACK_SIZE).spawn_scoped(scope, || {
                 let result = take().map(|work| work());
                 caller.unpark();
                 result

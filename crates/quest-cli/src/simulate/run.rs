@@ -1,5 +1,6 @@
 //! Runs experiments: trials in parallel, their numbers in order.
 
+use quest_core::robust::STACK_SIZE;
 use quest_core::{
     simulate::{Cell, Figure, PoseErrors, Reading, SceneError, SceneOptions},
     solver::{Kinds, SolverName},
@@ -69,7 +70,7 @@ impl Run {
 
     /// All numbers, figure by figure, the table last.
     pub(crate) fn execute(&self) -> Result<Vec<Record>, Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).stack_size(STACK_SIZE).build();
         let pool = pool.map_err(|error| Failure::Arguments(format!("--threads: {error}")))?;
         let progress = self.progress();
         let mut records = Vec::new();

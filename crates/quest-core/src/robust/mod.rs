@@ -53,7 +53,7 @@ mod third_view;
 
 use rand_chacha::ChaCha8Rng;
 
-pub use batch::{Batch, Problem, estimate_batch};
+pub use batch::{Batch, Problem, STACK_SIZE, estimate_batch};
 pub use estimate::{Estimate, Evidence, Model, RunnerUp};
 pub use options::{EstimateError, KnownDirection, Options, Priors};
 pub use third_view::{ThirdView, estimate_with_third_view};

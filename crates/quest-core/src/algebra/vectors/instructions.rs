@@ -150,9 +150,9 @@ impl Token {
     #[inline]
     pub(crate) fn run<K: Task>(self, task: K) -> K::Output {
         match self {
-            Self::Portable => task.run(Portable),
+            Self::Portable => in_own_frame(task, Portable),
             #[cfg(target_arch = "x86_64")]
-            Self::Sse2(simd) => task.run(Sse2(simd)),
+            Self::Sse2(simd) => in_own_frame(task, Sse2(simd)),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => Simd::vectorize(simd, Adapter::<_, Align32>(task, [])),
             #[cfg(target_arch = "x86_64")]
@@ -172,6 +172,13 @@ impl Token {
             Self::Avx512(_) => Instructions::Avx512,
         }
     }
+}
+
+/// Runs a task where its variables lie on the stack only while it runs. Without optimisation all of them have a place of their own, in the
+/// solver of samples a megabyte for each kind of lanes, and a thread has two.
+#[inline(never)]
+fn in_own_frame<K: Task, L: WordLanes + Lanes<f32>>(task: K, lanes: L) -> K::Output {
+    task.run(lanes)
 }
 
 /// A task in the form that pulp runs.
