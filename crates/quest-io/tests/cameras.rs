@@ -119,6 +119,10 @@ fn calibrations_of_opencv() {
         assert_eq!(read(name, text, None).unwrap(), camera, "{name}");
     }
     // The names of older versions, four coefficients, a fisheye, no distortion at all.
+    // What the beginning says comes before the extension.
+    for (name, text) in [("a.txt", YAML), ("a.bin", YAML), ("a.txt", XML), ("a.bin", XML)] {
+        assert_eq!(read(name, text, None).unwrap(), camera, "{name}");
+    }
     let old = YAML.replace("camera_matrix", "Camera_Matrix").replace("distortion_coef", "Distortion_Coef");
     assert_eq!(read("a.yml", old, None).unwrap(), camera);
     let four = XML.replace("    2.3839153080878486e-01</data>", "</data>");
@@ -128,6 +132,9 @@ fn calibrations_of_opencv() {
     assert_eq!(read("a.xml", fisheye, None).unwrap(), model);
     let plain = "K: [[500, 0, 320], [0, 510, 240], [0, 0, 1]]\nimage_size: [640, 480]\n";
     assert_eq!(read("a.yaml", plain, None).unwrap(), expected("PINHOLE", &[500.0, 510.0, 320.0, 240.0]));
+    // The same list once more under another key.
+    let alias = plain.replace("K: ", "K: &k ").replace("image_size", "other: *k\nimage_size");
+    assert_eq!(read("a.yaml", alias, None).unwrap(), expected("PINHOLE", &[500.0, 510.0, 320.0, 240.0]));
 }
 
 #[test]
@@ -190,6 +197,21 @@ fn cameras_of_colmap() {
     }
     let more = refused("cameras.bin", [&bytes[..], b"x"].concat(), Some("7"));
     assert_eq!(more, "cameras.bin: found more bytes after 2 cameras, expected COLMAP's cameras.bin");
+    // The extension says it where the beginning does not.
+    assert_eq!(refused("cameras.bin", "text", None), cut);
+    // A camera without a size.
+    let plain = camera("PINHOLE", None, &[500.0, 510.0, 320.0, 240.0]).unwrap();
+    for size in ["0 0", "640 0", "0 480"] {
+        let text = format!("7 PINHOLE {size} 500 510 320 240");
+        assert_eq!(read("cameras.txt", text, None).unwrap(), plain, "{size}");
+    }
+    assert_eq!(read("cameras.bin", binary(&[(7, plain, (0, 0))]), None).unwrap(), plain);
+    // Twenty of the numbers are named.
+    let many = |count: usize| {
+        let lines = (0..count).map(|k| format!("{k} PINHOLE 640 480 500 510 320 240\n"));
+        refused("cameras.txt", lines.collect::<String>(), None)
+    };
+    assert!(many(20).contains(" 18, 19, expected") && many(21).contains(" 18, 19, …, expected"));
     let mut model = bytes.clone();
     model[12] = 99;
     let unknown =

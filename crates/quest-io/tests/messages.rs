@@ -221,6 +221,13 @@ fn tables() {
     }
     assert_eq!(pair("a.csv", "u1,v1,tag,u2,v2\n1,2,x,3,4\n").unknown_keys, ["tag"]);
     assert_eq!(pair("a.csv", "1,2,3,4,0.5\n").scores, Some(vec![0.5]));
+    // A row that begins with a gap is a row; what is no number is no gap.
+    let gaps = pair("a.csv", "1,2,3,4\n,,,\n,2,3,4\n");
+    assert_eq!(gaps.matches.iter().map(|m| m[0].is_nan()).collect::<Vec<_>>(), [false, true, true]);
+    assert!(all("a.csv", "u1,v1,u2,v2\n1,2,x,4\n")[0].is_err());
+    let word = "a.csv:2: u1: found \"1,x\", expected a finite number";
+    refused("a.csv", "u1;v1;u2;v2\n1,x;2;3;4\n", word);
+    refused("a.csv", "1\n2\n", &format!("a.csv:1: {}", columns.replace('3', "1")));
     // A comment that is no header, and a second one that would be.
     assert_eq!(pair("a.csv", "# words\n1,2,3,4\n").matches.len(), 1);
     assert_eq!(pair("a.csv", "1,2,3,4\n# u1,v1,u2,v2\n5,6,7,8\n").matches.len(), 2);
@@ -247,6 +254,12 @@ fn the_form_is_that_of_the_extension_or_of_the_beginning() {
         assert!(!format.info().help.is_empty());
     }
     assert_eq!((Format::named("xml"), Format::from_extension(Path::new("json"))), (None, None));
+    for format in Format::ALL {
+        assert_eq!(format.is_built(), format != Format::Parquet || cfg!(feature = "parquet"), "{format:?}");
+    }
+    let folder = folder_with("a", "PAR1 and no more");
+    let parquet = quest_io::read(&folder.path().join("a"), None).map(Iterator::count).unwrap_err();
+    assert!(parquet.to_string().contains("Parquet"), "{parquet}");
     let object = "{\"matches\": [[1, 2, 3, 4]]}";
     for (text, format, count) in [
         (object.to_owned(), Format::Json, 1),

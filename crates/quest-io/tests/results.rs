@@ -79,6 +79,7 @@ fn a_second_pose_has_its_errors_too() {
     let found = EstimateRecord::new(None, &estimate, &truth(&pose), 0.0).found.unwrap();
     let second = found.runner_up.unwrap();
     assert_eq!((second.inlier_count, second.score, found.normal), (30, 0.5, Some([0.1, 0.0, 0.3])));
+    assert!(found.normal.unwrap().iter().all(|x| x.is_sign_positive()), "no zero has a sign");
     assert!((second.rotation_error_deg.unwrap() - 2.0).abs() < 1e-9);
     assert!(second.translation_error_deg.unwrap() < 1e-6);
 }
@@ -201,7 +202,10 @@ fn places_that_cannot_be_written_to_are_refused_before_the_work() {
     fs::set_permissions(&locked, permissions).unwrap();
     assert!(said(&locked).ends_with("cannot be written: permission denied"), "{}", said(&locked));
     for path in [None, Some(Path::new("-")), Some(Path::new("/dev/stdout"))] {
-        Output::open(path).unwrap().finish().unwrap();
+        let mut output = Output::open(path).unwrap();
+        let error = output.write(|_| Err(io::Error::other("no"))).unwrap_err();
+        assert_eq!(error.target, "standard output");
+        output.finish().unwrap();
     }
 }
 
@@ -234,6 +238,19 @@ fn links_stay_links_and_devices_stay_devices() {
     let mut null = Output::open(Some(Path::new("/dev/null"))).unwrap();
     write(&mut null, "nothing");
     null.finish().unwrap();
+    // A pipe with a name stays a pipe.
+    if std::process::Command::new("mkfifo").arg(path("pipe")).status().is_ok_and(|status| status.success()) {
+        use std::os::unix::fs::FileTypeExt;
+        // Open on both sides: nothing waits for the other.
+        let mut both = fs::OpenOptions::new().read(true).write(true).open(path("pipe")).unwrap();
+        let mut output = Output::open(Some(&path("pipe"))).unwrap();
+        write(&mut output, "one");
+        output.finish().unwrap();
+        assert!(fs::metadata(path("pipe")).unwrap().file_type().is_fifo());
+        let mut text = [0; 3];
+        io::Read::read_exact(&mut both, &mut text).unwrap();
+        assert_eq!(&text, b"one");
+    }
     let (mut null, count) = Output::growing(Some(Path::new("/dev/null")), true).unwrap();
     write(&mut null, "nothing");
     assert_eq!(count, 0);
@@ -267,6 +284,12 @@ fn a_run_that_is_ended_goes_on_where_it_was() {
     assert_eq!(count, 0);
     let (_, count) = Output::growing(None, true).unwrap();
     assert_eq!(count, 0);
+    // A part that is there and cannot be read is not begun anew.
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("c.part", folder.path().join("c.part")).unwrap();
+        assert!(Output::growing(Some(&folder.path().join("c")), true).is_err());
+    }
     fs::create_dir(folder.path().join("b.part")).unwrap();
     assert!(Output::growing(Some(&folder.path().join("b")), true).is_err());
 }
