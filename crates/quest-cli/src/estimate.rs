@@ -140,7 +140,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         arguments.threads,
         numbered.skip(there),
         |(index, pair): (u64, Result<Pair, Result<Unread, ReadError>>)| match pair {
-            Ok(pair) => one_pair(arguments, index, &pair, is_several),
+            Ok(pair) => one_pair(arguments, index, pair, is_several),
             Err(Ok(unread)) => Ok(Estimated::unreadable(index, unread)),
             Err(Err(error)) => Err(error.into()),
         },
@@ -199,9 +199,16 @@ impl Arguments {
     }
 }
 
-fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) -> Result<Estimated, Failure> {
+fn one_pair(
+    arguments: &Arguments,
+    index: u64,
+    mut pair: Pair,
+    is_several: bool,
+) -> Result<Estimated, Failure> {
     let usable = pair.usable();
-    let options = match arguments.options(pair, index) {
+    // Ten million matches need not be there twice.
+    let match_count = std::mem::take(&mut pair.matches).len();
+    let options = match arguments.options(&pair, index) {
         Err(error) if is_several => {
             return Ok(Estimated::unreadable(index, Unread { name: pair.name.clone(), error }));
         }
@@ -215,11 +222,11 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) ->
             return Err(gap.unwrap_or_else(|| pair.refuse(error)).into());
         }
         (Some(error), Invalid::Pair) => Err(error.into()),
-        _ => search(arguments, pair, &usable, &options, third.as_ref()),
+        _ => search(arguments, &pair, &usable, &options, third.as_ref()),
     };
     let elapsed_ms = start.elapsed().as_secs_f64() * 1e3;
     let (record, reason) = match result {
-        Ok((estimate, third)) => (found(pair, &estimate, third.as_ref(), elapsed_ms), None),
+        Ok((estimate, third)) => (found(&pair, &estimate, third.as_ref(), elapsed_ms), None),
         Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
         // One pair of a file that has no pose is no reason to stop; a file that holds nothing else is bad input.
         Err(EstimateError::Input(error)) if !(is_several || matches!(error, InputError::Match { .. })) => {
@@ -229,10 +236,9 @@ fn one_pair(arguments: &Arguments, index: u64, pair: &Pair, is_several: bool) ->
             (EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms), Some(error.to_string()))
         }
     };
-    let (invalid_count, match_count) = (usable.invalid.len(), pair.matches.len());
-    let record = EstimateRecord { key: index, match_count, invalid_count, ..record };
+    let record = EstimateRecord { key: index, match_count, invalid_count: usable.invalid.len(), ..record };
     let name = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
-    let heading = words::one_line(&format!("{name}: {} matches{}", pair.matches.len(), summary(&record)));
+    let heading = words::one_line(&format!("{name}: {match_count} matches{}", summary(&record)));
     let refusal = reason.map(|reason| Refusal::NoPose(format!("{}: {reason}", pair.place)));
     Ok(Estimated { heading, record, focal_length: pair.focal_length(), refusal })
 }

@@ -274,14 +274,7 @@ impl Usable {
         if x1.len() != x2.len() {
             return Err(InputError::LengthMismatch { first: x1.len(), second: x2.len() });
         }
-        let mut all = Self { matches: Vec::with_capacity(x1.len()), invalid: Vec::new() };
-        for (place, (&a, &b)) in x1.iter().zip(x2).enumerate() {
-            match one(a, b) {
-                Ok(m) => all.matches.push(m),
-                Err(error) => all.invalid.push((place, error)),
-            }
-        }
-        Ok(all)
+        Ok(x1.iter().zip(x2).map(|(&a, &b)| one(a, b)).collect())
     }
 
     /// How many matches were given.
@@ -318,6 +311,21 @@ impl Usable {
             }
         }
         all
+    }
+}
+
+impl FromIterator<Result<Correspondence, MatchError>> for Usable {
+    /// Sets apart what was refused.
+    fn from_iter<I: IntoIterator<Item = Result<Correspondence, MatchError>>>(all: I) -> Self {
+        let all = all.into_iter();
+        let mut usable = Self { matches: Vec::with_capacity(all.size_hint().0), invalid: Vec::new() };
+        for (place, one) in all.enumerate() {
+            match one {
+                Ok(m) => usable.matches.push(m),
+                Err(error) => usable.invalid.push((place, error)),
+            }
+        }
+        usable
     }
 }
 

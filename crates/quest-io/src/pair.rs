@@ -1,8 +1,8 @@
 //! An image pair: cameras, matches, and the other data that a file has about them.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use quest_core::correspondence::{self, Usable};
-use quest_core::{Camera, Correspondence, InputError, RelativePose};
+use quest_core::correspondence::Usable;
+use quest_core::{Camera, Correspondence, InputError, MatchError, RelativePose};
 
 use crate::error::{Fault, Place, ReadError};
 
@@ -62,26 +62,22 @@ impl Pair {
         if let Some(gap) = &self.first_gap {
             return Err(gap.clone().into());
         }
-        let view = |k| self.matches.iter().map(|m| [m[k], m[k + 1]]).collect::<Vec<_>>();
-        let (x1, x2) = (view(0), view(2));
-        let matches = match &self.cameras {
-            Some([camera1, camera2]) => correspondence::from_pixels(camera1, &x1, camera2, &x2),
-            None => correspondence::from_image_points(&x1, &x2),
-        };
-        matches.map_err(|error| self.refuse(error))
+        let each = self.matches.iter().enumerate();
+        let refuse = |index, source| self.refuse(InputError::Match { index, source });
+        each.map(|(index, m)| self.one(*m).map_err(|source| refuse(index, source))).collect()
     }
 
     /// The matches that have bearings, and which do not: to an estimate they are outliers.
     #[must_use]
     pub fn usable(&self) -> Usable {
-        let view = |k| self.matches.iter().map(|m| [m[k], m[k + 1]]).collect::<Vec<_>>();
-        let (x1, x2) = (view(0), view(2));
-        let usable = match &self.cameras {
-            Some([camera1, camera2]) => Usable::from_pixels(camera1, &x1, camera2, &x2),
-            None => Usable::from_image_points(&x1, &x2),
-        };
-        // The two views have as many points, which is all that could be refused.
-        usable.unwrap_or_default()
+        self.matches.iter().map(|m| self.one(*m)).collect()
+    }
+
+    fn one(&self, [u1, v1, u2, v2]: [f64; 4]) -> Result<Correspondence, MatchError> {
+        match &self.cameras {
+            Some([camera1, camera2]) => Correspondence::from_pixels(camera1, [u1, v1], camera2, [u2, v2]),
+            None => Correspondence::from_image_points([u1, v1], [u2, v2]),
+        }
     }
 
     /// The error that the matches of this pair are unusable, with their place.

@@ -123,19 +123,19 @@ fn answer(
 /// Why there is no pose, when the best one has so many inliers and so large a share of false matches: what is wrong with the
 /// matches, if anything is.
 fn no_pose(observations: &Observations, inliers: usize, false_share: f64) -> EstimateError {
-    let some = &observations.matches[..observations.len().min(DIAGNOSED)];
     // Within a threshold as wide as the image all points are on a line.
-    let otherwise = if false_share < options::UNUSUAL && observations.is_line(some) {
+    let otherwise = if false_share < options::UNUSUAL && observations.is_line(&observations.first(DIAGNOSED))
+    {
         InputError::Degenerate(Degeneracy::Collinear).into()
     } else {
-        EstimateError::NoPose { inliers, matches: observations.given, false_share }
+        EstimateError::NoPose { inliers, matches: observations.given.len(), false_share }
     };
     degenerate(observations, otherwise)
 }
 
 /// What is exactly wrong with the matches, or something else.
 fn degenerate(observations: &Observations, otherwise: EstimateError) -> EstimateError {
-    match diagnose(&observations.matches[..observations.len().min(DIAGNOSED)]) {
+    match diagnose(&observations.first(DIAGNOSED)) {
         Degeneracy::RankDeficient => otherwise,
         reason => InputError::Degenerate(reason).into(),
     }

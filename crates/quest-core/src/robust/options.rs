@@ -224,7 +224,7 @@ impl Priors<'_> {
         let scores = self.scores?;
         #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
         let mut ranked: Vec<u32> = (0..observations.len() as u32).collect();
-        let score = |i: u32| scores[observations.order[i as usize]];
+        let score = |i: u32| scores[observations.order[i as usize] as usize];
         ranked.sort_by(|&i, &j| score(j).total_cmp(&score(i)));
         Some(ranked)
     }

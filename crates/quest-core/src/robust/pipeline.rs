@@ -37,35 +37,35 @@ impl Task<'_> {
     /// first, and are right where they agree with a pose at least as often.
     pub(crate) fn run(&self) -> Result<Estimate, EstimateError> {
         let mut rng = sampling::generator(self.options.seed, self.options.index);
-        let mut order: Vec<usize> = (0..self.matches.len()).collect();
+        let mut order: Vec<u32> = (0..).take(self.matches.len()).collect();
         order.shuffle(&mut rng);
-        let keypoints = Keypoints::new(self.matches);
+        let keypoints = Some(Keypoints::new(self.matches)).filter(Keypoints::are_shared);
         let needed = self.options.solver.info().min_matches.max(MIN_MATCHES);
-        let is_unmoved: Vec<bool> =
-            self.matches.iter().map(|m| (m.bearing1() - m.bearing2()).norm() < UNMOVED).collect();
-        let moved: Vec<usize> = order.iter().copied().filter(|&i| !is_unmoved[i]).collect();
-        let unmoved = order.len() - moved.len();
+        let is_unmoved = |m: &Correspondence| (m.bearing1() - m.bearing2()).norm() < UNMOVED;
+        let unmoved = self.matches.iter().filter(|m| is_unmoved(m)).count();
         let mut second = None;
-        if unmoved >= LEAST_UNMOVED && moved.len() >= needed {
-            let found = self.of(&moved, &keypoints, rng.clone());
-            let found = found.ok().filter(|found| !self.explains_most(&found.pose, &is_unmoved));
+        if unmoved >= LEAST_UNMOVED && order.len() - unmoved >= needed {
+            let is_moved = |&i: &u32| !is_unmoved(&self.matches[i as usize]);
+            let moved = order.iter().copied().filter(is_moved).collect();
+            let found = self.of(moved, keypoints.as_ref(), rng.clone());
+            let found = found.ok().filter(|found| !self.explains_most(&found.pose, is_unmoved));
             match found {
                 Some(found) if found.inlier_count >= unmoved => return Ok(Estimate { unmoved, ..found }),
                 found => second = found,
             }
         }
-        let mut found = self.of(&order, &keypoints, rng)?;
+        let mut found = self.of(order, keypoints.as_ref(), rng)?;
         if let Some(Estimate { pose, score, inlier_count, .. }) = second {
             found.runner_up = Some(RunnerUp { pose, score, inlier_count });
         }
         Ok(found)
     }
 
-    /// The estimate from some of the matches, in random order.
+    /// The estimate from some of the matches, in random order; `keypoints` where some are shared.
     fn of(
         &self,
-        order: &[usize],
-        keypoints: &Keypoints,
+        order: Vec<u32>,
+        keypoints: Option<&Keypoints>,
         mut rng: ChaCha8Rng,
     ) -> Result<Estimate, EstimateError> {
         let Self { matches, options, priors, answer, is_cancelled } = *self;
@@ -76,23 +76,27 @@ impl Task<'_> {
         }
         let score = |i: usize| priors.scores.map_or(0.0, |scores| -scores[i]);
         // Where each keypoint once leaves too little all are kept, and what is wrong with them is found as ever.
-        let one_each = (keypoints.are_shared())
-            .then(|| keypoints.one_each(order, score))
-            .filter(|one_each| one_each.len() >= needed && one_each.len() < order.len());
-        let observations = of(one_each.clone().unwrap_or_else(|| order.to_vec()));
+        let one_each = keypoints
+            .map(|keypoints| (keypoints, keypoints.one_each(&order, score)))
+            .filter(|(_, one_each)| one_each.len() >= needed && one_each.len() < order.len());
+        let (searched, shared) = match one_each {
+            Some((keypoints, one_each)) => (one_each, Some((keypoints, order))),
+            None => (order, None),
+        };
+        let observations = of(searched);
         let (mut poses, found) =
             search(&observations, options, priors, rng.clone(), is_cancelled).into_result();
         if is_cancelled() {
             return Err(EstimateError::Cancelled);
         }
         let found = found.ok_or_else(|| no_pose(&observations, 0, 0.0))?;
-        if one_each.is_none() {
+        let Some((keypoints, order)) = shared else {
             return conclude::conclude(&mut poses, &found, None, answer, options.max_false_alarms, &mut rng);
-        }
+        };
         // One of the matches that share a keypoint is kept: the one that agrees best.
-        let all = of(order.to_vec());
+        let all = of(order);
         let nearest = nearest(&all, &found.best.motion);
-        let best_each = of(keypoints.one_each(order, |i| nearest[i]));
+        let best_each = of(keypoints.one_each(&all.order, |i| nearest[i]));
         let mut poses = PoseScorer::new(&best_each, options.loss);
         let blind = Some(&observations);
         let mut found =
@@ -103,8 +107,9 @@ impl Task<'_> {
     }
 
     /// Whether a pose has most of the matches that did not move within the threshold.
-    fn explains_most(&self, pose: &RelativePose, is_unmoved: &[bool]) -> bool {
-        let order: Vec<usize> = (0..self.matches.len()).filter(|&i| is_unmoved[i]).collect();
+    fn explains_most(&self, pose: &RelativePose, is_unmoved: impl Fn(&Correspondence) -> bool) -> bool {
+        let all = (0_u32..).zip(self.matches);
+        let order: Vec<u32> = all.filter(|(_, m)| is_unmoved(m)).map(|(i, _)| i).collect();
         let count = order.len();
         let all = Observations::new(self.matches, order, self.options.focal_lengths, self.options.threshold);
         let direction = pose.t_21.try_normalize(0.0).unwrap_or_else(Vector3::x);
@@ -118,10 +123,10 @@ fn nearest(all: &Observations, motion: &Motion) -> Vec<f64> {
     let mut residuals = Residuals::default();
     all.columns.residuals(&motion.essential(), motion, &mut residuals);
     let reach = REACH * all.columns.threshold();
-    let mut nearest = vec![f64::INFINITY; all.given];
+    let mut nearest = vec![f64::INFINITY; all.given.len()];
     for (place, (&index, r)) in all.order.iter().zip(&residuals.values).enumerate() {
         if r.abs() < reach && residuals.is_in_front(place, 0) {
-            nearest[index] = r.abs();
+            nearest[index as usize] = r.abs();
         }
     }
     nearest

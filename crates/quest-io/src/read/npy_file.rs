@@ -42,6 +42,7 @@ pub(super) fn parse<const N: usize>(
     let other = || array(format!("found {} rows of {} numbers", table.height(), table.width));
     columns.check(table.width, other).map_err(|fault| place.clone().error(fault))?;
     let mut rows = Rows::new(table.width > N, unknown);
+    rows.values.reserve_exact(table.height());
     for (index, row) in table.values.chunks_exact(table.width).enumerate() {
         let refuse = |name, x: f64| {
             place.at_key(format!("matches[{index}].{name}")).error(Fault::NotANumber(x.to_string()))

@@ -158,7 +158,7 @@ mod tests {
     /// The matches beside those of the scene that the refined pose keeps within the threshold, the pose as it was polished, and
     /// as it is without chance.
     fn refined(scene: &Scene, start: Motion) -> (Vec<u32>, [Motion; 2]) {
-        let order = (0..scene.matches.len()).collect();
+        let order = (0..).take(scene.matches.len()).collect();
         let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
         let mut poses = PoseScorer::new(&observations, SearchScore::default());
         let polished = polish(&mut poses, start);

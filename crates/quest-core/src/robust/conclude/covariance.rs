@@ -196,7 +196,7 @@ mod tests {
 
     /// The determinant of the covariance of the direction, as it is given and by the normal equations alone.
     fn determinants(matches: &[Correspondence], motion: Motion) -> [f64; 2] {
-        let order = (0..matches.len()).collect();
+        let order = (0..).take(matches.len()).collect();
         let observations = Observations::new(matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
         let mut poses = PoseScorer::new(&observations, Score::default());
         let pose = poses.score(motion, 1.5);

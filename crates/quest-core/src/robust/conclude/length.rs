@@ -136,7 +136,7 @@ pub(crate) fn length(observations: &Observations, motion: &Motion, inliers: &[u3
         return Length { value: 0.0, variance: 0.0, is_clear: false, by_rotation: zero, by_direction: zero };
     }
     let of_inlier = |&index: &u32| {
-        let m = &observations.matches[index as usize];
+        let m = observations.at(index);
         let lengths = Some([m.length1(), m.length2()]);
         BothDepths::new(&observations.columns, index as usize, lengths, motion, noise.sigma)
     };

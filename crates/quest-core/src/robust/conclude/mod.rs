@@ -119,8 +119,7 @@ fn refuse_line(
 ) -> Result<(), EstimateError> {
     let inliers = &polished.pose.inliers;
     let some = &inliers[..inliers.len().min(DIAGNOSED)];
-    let some: Vec<_> = some.iter().map(|&i| observations.matches[i as usize]).collect();
-    if model == Model::PureRotation || !observations.is_line(&some) {
+    if model == Model::PureRotation || !observations.is_line(&observations.some(some)) {
         return Ok(());
     }
     if false_share >= UNUSUAL {

@@ -125,9 +125,9 @@ pub(crate) fn report(
 
 /// Whether each match that was given is an inlier.
 fn mask(observations: &Observations, inliers: &[u32]) -> Vec<bool> {
-    let mut mask = vec![false; observations.given];
+    let mut mask = vec![false; observations.given.len()];
     for &i in inliers {
-        mask[observations.order[i as usize]] = true;
+        mask[observations.order[i as usize] as usize] = true;
     }
     mask
 }
@@ -220,7 +220,7 @@ fn answers(
 
 /// The motion of a camera that only turns: the direction of what translation is left.
 fn still(observations: &Observations, inliers: &[u32], q_21: UnitQuaternion<f64>) -> Motion {
-    let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
+    let matches = observations.some(inliers);
     Motion { q_21, direction: translation_direction(&q_21, &matches) }
 }
 

@@ -36,7 +36,7 @@ pub(crate) fn rotation_alone(
     sigma: f64,
 ) -> UnitQuaternion<f64> {
     let some = &observations.framed(&inliers[..inliers.len().min(FITTED)]);
-    let matches: Vec<_> = inliers.iter().map(|&i| observations.matches[i as usize]).collect();
+    let matches = observations.some(inliers);
     let wide = GemanMcClure::new(2.0 * SCALE * sigma);
     let starts = [*q_21, best_rotation(&matches)].map(|mut q| {
         let cost = refine_rotation(some, &mut q, &wide, STEPS);

@@ -23,7 +23,8 @@ const LARGEST_EPIPOLE: f64 = 0.01;
 /// The poses of an essential matrix: of a motion, with the opposite translation, and the same of its twisted partner.
 pub(crate) const POSES: usize = 4;
 
-/// `x1` and `x2` of matches in pixels (see [`observations`](crate::robust::data::observations)), six columns.
+/// `x1` and `x2` of matches in pixels (see [`observations`](crate::robust::data::observations)), six columns. On planes every `z` is one,
+/// and its columns are empty.
 #[derive(Clone, Debug)]
 pub(crate) struct Columns {
     /// The two views, both planes or both spheres.
@@ -62,11 +63,15 @@ impl Columns {
         threshold: f64,
         points: impl ExactSizeIterator<Item = [Vector3<f64>; 2]>,
     ) -> Self {
-        let mut all: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(points.len()));
+        let has_column = |k: usize| k % 3 != 2 || matches!(images[k / 3], Image::Sphere(_));
+        let mut all: [Vec<f64>; 6] =
+            std::array::from_fn(|k| Vec::with_capacity(if has_column(k) { points.len() } else { 0 }));
         for [x1, x2] in points {
             let (x1, x2) = (images[0].scaled(&x1), images[1].scaled(&x2));
-            for (column, x) in all.iter_mut().zip(x1.iter().chain(x2.iter())) {
-                column.push(*x);
+            for (k, x) in x1.iter().chain(x2.iter()).enumerate() {
+                if has_column(k) {
+                    all[k].push(*x);
+                }
             }
         }
         Self { images, threshold, all }
@@ -80,6 +85,12 @@ impl Columns {
         &self.all
     }
 
+    /// One coordinate in pixels of one match.
+    #[inline]
+    pub(crate) fn at(&self, column: usize, index: usize) -> f64 {
+        self.all[column].get(index).copied().unwrap_or(1.0)
+    }
+
     /// The two views, both planes or both spheres.
     pub(crate) fn images(&self) -> [Image; 2] {
         self.images
@@ -87,7 +98,7 @@ impl Columns {
 
     /// The points of a match on the plane `z = 1`, or on the unit sphere.
     pub(crate) fn vectors(&self, index: usize) -> [Vector3<f64>; 2] {
-        let [x1, y1, z1, x2, y2, z2] = self.all.each_ref().map(|column| column[index]);
+        let [x1, y1, z1, x2, y2, z2] = std::array::from_fn(|k| self.at(k, index));
         let [d1, d2] = self.inverse_scales().map(Vector3::from);
         [Vector3::new(x1, y1, z1).component_mul(&d1), Vector3::new(x2, y2, z2).component_mul(&d2)]
     }
@@ -136,6 +147,9 @@ impl Columns {
             let shift = k * (n - 1) / shifts;
             let before = each.min(n - shift);
             for (column, (out, from)) in all.iter_mut().zip(&self.all).enumerate() {
+                if from.is_empty() {
+                    continue;
+                }
                 if column < 3 {
                     out.extend_from_slice(&from[..each]);
                 } else {
@@ -228,17 +242,20 @@ impl View {
 
     #[inline(always)]
     fn fill<const SPHERE: bool>(&self, columns: &Columns, out: &mut Residuals) {
+        const ONES: &[f64; WIDTH] = &[1.0; WIDTH];
         let chunks = columns.all.each_ref().map(|c| c.as_chunks::<WIDTH>());
+        let [x1, y1, z1, x2, y2, z2] = chunks.map(|c| c.0);
         let (residuals, last_residuals) = out.values.as_chunks_mut::<WIDTH>();
         let (sides, last_sides) = out.sides.as_chunks_mut::<WIDTH>();
         for (i, (residuals, sides)) in residuals.iter_mut().zip(sides).enumerate() {
-            self.few::<SPHERE>(chunks.map(|c| &c.0[i]), residuals, sides);
+            let (z1, z2) = if SPHERE { (&z1[i], &z2[i]) } else { (ONES, ONES) };
+            self.few::<SPHERE>([&x1[i], &y1[i], z1, &x2[i], &y2[i], z2], residuals, sides);
         }
         let left = last_residuals.len();
         if left > 0 {
             let padded = chunks.map(|(_, rest)| {
                 let mut padded = [1.0; WIDTH];
-                padded[..left].copy_from_slice(rest);
+                padded[..rest.len()].copy_from_slice(rest);
                 padded
             });
             let (mut residuals, mut sides) = ([0.0; WIDTH], [0; WIDTH]);
@@ -312,17 +329,18 @@ mod tests {
     use crate::{Correspondence, RelativePose};
 
     /// One block and a part of one; on the sphere where the bearings do not have `z = 1`.
-    fn observations(is_sphere: bool) -> (Observations, RelativePose) {
+    fn matches(is_sphere: bool) -> (Vec<Correspondence>, RelativePose) {
         let options = SceneOptions { points: 13, noise_px: 2.0, ..SceneOptions::realistic() };
         let scene = Scene::generate(&options, 43, 1).unwrap();
         let unit = |m: &Correspondence| {
             Correspondence::from_bearings((*m.bearing1()).into(), (*m.bearing2()).into()).unwrap()
         };
-        let matches: Vec<_> =
-            if is_sphere { scene.matches.iter().map(unit).collect() } else { scene.matches };
-        let all = Observations::new(&matches, (0..13).collect(), [[FOCAL_LENGTH; 2]; 2], 1.0);
-        assert_eq!(all.columns.is_sphere(), is_sphere);
-        (all, scene.truth)
+        let matches = if is_sphere { scene.matches.iter().map(unit).collect() } else { scene.matches };
+        (matches, scene.truth)
+    }
+
+    fn observations(matches: &[Correspondence]) -> Observations<'_> {
+        Observations::new(matches, (0..13).collect(), [[FOCAL_LENGTH; 2]; 2], 1.0)
     }
 
     fn residuals(all: &Observations, motion: &Motion) -> Residuals {
@@ -334,10 +352,12 @@ mod tests {
     #[test]
     fn residuals_are_sampson_errors() {
         for is_sphere in [false, true] {
-            let (all, truth) = observations(is_sphere);
+            let (matches, truth) = matches(is_sphere);
+            let all = observations(&matches);
+            assert_eq!(all.columns.is_sphere(), is_sphere);
             let motion = Motion { q_21: truth.q_21, direction: truth.t_21.normalize() };
             let e = motion.essential();
-            for (m, r) in all.matches.iter().zip(residuals(&all, &motion).values) {
+            for (m, r) in matches.iter().zip(residuals(&all, &motion).values) {
                 let [a, b] = [m.bearing1() / m.bearing1().z, m.bearing2() / m.bearing2().z];
                 let (line2, line1) = (e * a, e.tr_mul(&b));
                 let on_plane = b.dot(&line2) / (line2.xy().norm_squared() + line1.xy().norm_squared()).sqrt();
@@ -351,7 +371,8 @@ mod tests {
     #[test]
     fn points_are_in_front_of_the_true_pose_alone() {
         for is_sphere in [false, true] {
-            let (all, truth) = observations(is_sphere);
+            let (matches, truth) = matches(is_sphere);
+            let all = observations(&matches);
             let motion = Motion { q_21: truth.q_21, direction: truth.t_21.normalize() };
             let opposite = |m: Motion| Motion { direction: -m.direction, ..m };
             let starts = [motion, opposite(motion), motion.twisted(), opposite(motion.twisted())];
@@ -367,7 +388,8 @@ mod tests {
 
     #[test]
     fn shifted_matches_are_false() {
-        let (all, _) = observations(false);
+        let (matches, _) = matches(false);
+        let all = observations(&matches);
         let [x1, _, _, x2, _, _] = all.columns.all();
         for (count, expected) in [(5, 5), (13, 13), (14, 26), (1_000, 13 * 12)] {
             let shifted = all.columns.shifted(count);

@@ -1,9 +1,6 @@
 //! Which matches share a keypoint. A point is seen once in a view: of the matches of one keypoint at most one is true, and a match
 //! that is there twice says nothing twice.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-
 use crate::Correspondence;
 
 /// The keypoints of every match, one number for each keypoint of a view.
@@ -14,48 +11,75 @@ pub(crate) struct Keypoints {
     counts: [Vec<u32>; 2],
 }
 
-/// Multiplies and rotates: bits of coordinates need no more, and a tenth of the time of an estimate would go into a hash that
-/// withstands malice.
-#[derive(Debug, Default)]
-struct Mix(u64);
+/// The coordinates of a keypoint as bits.
+type Key = [u64; 3];
 
-impl Hasher for Mix {
-    fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 29)
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.write_u64(u64::from(byte));
-        }
-    }
-
-    fn write_u64(&mut self, value: u64) {
-        // 2^64 over the golden ratio.
-        self.0 = (self.0.rotate_left(23) ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    }
+fn key(m: &Correspondence, view: usize) -> Key {
+    let bearing = if view == 0 { m.bearing1() } else { m.bearing2() };
+    // One zero, not two.
+    <[f64; 3]>::from(*bearing).map(|x| (x + 0.0).to_bits())
 }
 
-type Ids = HashMap<[u64; 3], u32, BuildHasherDefault<Mix>>;
+/// The first match of each keypoint of a view, each at the place that its coordinates say or at the next that is free. Coordinates are
+/// looked up in the matches: with them a table for ten million matches would have half a gigabyte.
+struct Firsts {
+    /// A power of two of them, a third of them free.
+    places: Vec<u32>,
+    shift: u32,
+}
+
+impl Firsts {
+    const FREE: u32 = u32::MAX;
+
+    fn new(matches: usize) -> Self {
+        let size = (matches + matches / 2 + 2).next_power_of_two();
+        Self { places: vec![Self::FREE; size], shift: u64::BITS - size.trailing_zeros() }
+    }
+
+    /// Multiplies and rotates: bits of coordinates need no more, and a tenth of the time of an estimate would go into a hash that
+    /// withstands malice. The first bits of a product depend on all.
+    fn place_of(&self, key: Key) -> usize {
+        // 2^64 over the golden ratio.
+        let mix = |hash: u64, x: u64| (hash.rotate_left(23) ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let hash = key.into_iter().fold(0, mix);
+        #[expect(clippy::cast_possible_truncation, reason = "below the length of a list")]
+        let place = (hash >> self.shift) as usize;
+        place
+    }
+
+    /// The first match with the keypoint of a match, which is put there if there is none.
+    fn first(&mut self, matches: &[Correspondence], view: usize, index: u32) -> u32 {
+        let own = key(&matches[index as usize], view);
+        let mut place = self.place_of(own);
+        loop {
+            match self.places[place] {
+                Self::FREE => {
+                    self.places[place] = index;
+                    return index;
+                }
+                first if key(&matches[first as usize], view) == own => return first,
+                _ => place = (place + 1) % self.places.len(),
+            }
+        }
+    }
+}
 
 impl Keypoints {
     pub(crate) fn new(matches: &[Correspondence]) -> Self {
         let mut counts = [Vec::new(), Vec::new()];
         let mut of_match = vec![[0; 2]; matches.len()];
         for (view, counts) in counts.iter_mut().enumerate() {
-            let mut ids = Ids::with_capacity_and_hasher(matches.len(), BuildHasherDefault::default());
-            for (of_match, m) in of_match.iter_mut().zip(matches) {
-                let bearing = if view == 0 { m.bearing1() } else { m.bearing2() };
-                // One zero, not two.
-                let key = <[f64; 3]>::from(*bearing).map(|x| (x + 0.0).to_bits());
-                #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
-                let next = ids.len() as u32;
-                let id = *ids.entry(key).or_insert(next);
+            let mut firsts = Firsts::new(matches.len());
+            let mut next = 0;
+            for (index, i) in (0_u32..).zip(0..matches.len()) {
+                let first = firsts.first(matches, view, index);
+                let id = if first == index { next } else { of_match[first as usize][view] };
                 if id == next {
                     counts.push(0);
+                    next += 1;
                 }
                 counts[id as usize] += 1;
-                of_match[view] = id;
+                of_match[i][view] = id;
             }
         }
         Self { of_match, counts }
@@ -68,11 +92,12 @@ impl Keypoints {
 
     /// Those of some matches, in their order, that are left if each keypoint keeps one match, the `first` of its matches.
     /// Among equals the match whose keypoints have fewer others is first.
-    pub(crate) fn one_each(&self, order: &[usize], first: impl Fn(usize) -> f64) -> Vec<usize> {
+    pub(crate) fn one_each(&self, order: &[u32], first: impl Fn(usize) -> f64) -> Vec<u32> {
         let others = |i: usize| -> u64 {
             (0..2).map(|view| u64::from(self.counts[view][self.of_match[i][view] as usize])).product()
         };
-        let mut by_worth: Vec<_> = order.iter().map(|&i| (first(i), others(i), i)).collect();
+        let mut by_worth: Vec<_> =
+            order.iter().map(|&i| (first(i as usize), others(i as usize), i as usize)).collect();
         by_worth.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut is_taken = self.counts.each_ref().map(|counts| vec![false; counts.len()]);
         let mut is_kept = vec![false; self.of_match.len()];
@@ -83,7 +108,7 @@ impl Keypoints {
                 is_kept[i] = true;
             }
         }
-        order.iter().copied().filter(|&i| is_kept[i]).collect()
+        order.iter().copied().filter(|&i| is_kept[i as usize]).collect()
     }
 
     /// Marks the matches that are the same as a marked one.

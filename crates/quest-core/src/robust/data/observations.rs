@@ -21,41 +21,54 @@ use crate::robust::data::point_transfer::Framed;
 /// How a match as it was given lies on the plane `z = 1`: rounding.
 const ON_PLANE: f64 = 1e-9;
 
-/// The matches of one estimate.
+/// The matches of one estimate, in random order.
 #[derive(Debug)]
-pub(crate) struct Observations {
-    /// The matches in random order.
-    pub(crate) matches: Vec<Correspondence>,
-    /// Where each of them stands in the caller's order.
-    pub(crate) order: Vec<usize>,
-    /// How many matches the caller has.
-    pub(crate) given: usize,
-    /// The same matches in columns.
+pub(crate) struct Observations<'a> {
+    /// All matches of the caller.
+    pub(crate) given: &'a [Correspondence],
+    /// Where each of those that are observed stands among them.
+    pub(crate) order: Vec<u32>,
+    /// Those that are observed, in columns.
     pub(crate) columns: Columns,
 }
 
-impl Observations {
+impl<'a> Observations<'a> {
     /// Some of the matches in this order, with the focal lengths of both views and the inlier threshold in pixels.
     pub(crate) fn new(
-        given: &[Correspondence],
-        order: Vec<usize>,
+        given: &'a [Correspondence],
+        order: Vec<u32>,
         focal_lengths: [[f64; 2]; 2],
         threshold: f64,
     ) -> Self {
-        let matches: Vec<_> = order.iter().map(|&i| given[i]).collect();
-        let is_plane = matches.iter().all(|m| {
+        let matches = || order.iter().map(|&i| &given[i as usize]);
+        let is_plane = matches().all(|m| {
             let off = |z: f64, length: f64| (z * length - 1.0).abs() < ON_PLANE;
             off(m.bearing1().z, m.length1()) && off(m.bearing2().z, m.length2())
         });
         let images = focal_lengths
             .map(|f| if is_plane { Image::Plane(f) } else { Image::Sphere((f[0] * f[1]).sqrt()) });
-        let points = matches.iter().map(|m| [*m.bearing1(), *m.bearing2()]);
+        let points = matches().map(|m| [*m.bearing1(), *m.bearing2()]);
         let columns = Columns::of_points(images, threshold, points);
-        Self { matches, order, given: given.len(), columns }
+        Self { given, order, columns }
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.matches.len()
+        self.order.len()
+    }
+
+    /// The match at this place of the order.
+    pub(crate) fn at(&self, place: u32) -> &'a Correspondence {
+        &self.given[self.order[place as usize] as usize]
+    }
+
+    /// The matches at some places of the order.
+    pub(crate) fn some(&self, places: &[u32]) -> Vec<Correspondence> {
+        places.iter().map(|&place| *self.at(place)).collect()
+    }
+
+    /// The first so many matches of the order, or all.
+    pub(crate) fn first(&self, count: usize) -> Vec<Correspondence> {
+        self.order.iter().take(count).map(|&i| self.given[i as usize]).collect()
     }
 
     pub(crate) fn is_sphere(&self) -> bool {
@@ -71,8 +84,8 @@ impl Observations {
     /// The area of view 2, in square pixels, over which its points are spread: that of a rectangle, evenly filled, with
     /// their second moments.
     pub(crate) fn area_of_view2(&self) -> f64 {
-        let [_, _, _, x, y, z] = self.columns.all();
-        let points = || x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
+        let point = |i| Vector3::from(std::array::from_fn(|k| self.columns.at(3 + k, i)));
+        let points = || (0..self.len()).map(point);
         let count = self.len() as f64;
         let mean = points().sum::<Vector3<f64>>() / count;
         let moments = points().map(|x| (x - mean) * (x - mean).transpose()).sum::<Matrix3<f64>>() / count;

@@ -83,11 +83,10 @@ impl One {
 
 impl Subset {
     pub(crate) fn new(all: &Columns, indices: &[u32]) -> Self {
-        let columns = all.all();
         let block = |some: &[u32]| {
             let index = |j: usize| some[j.min(some.len() - 1)] as usize;
             Block {
-                columns: std::array::from_fn(|k| std::array::from_fn(|j| columns[k][index(j)])),
+                columns: std::array::from_fn(|k| std::array::from_fn(|j| all.at(k, index(j)))),
                 live: std::array::from_fn(|j| if j < some.len() { 1.0 } else { 0.0 }),
             }
         };

@@ -28,6 +28,7 @@ pub(crate) fn of_solver(solver: SolverName, matches: usize) -> Box<dyn Hypothesi
     match solver {
         SolverName::Quest => Box::new(Lanes {
             solver: BatchSolver::new(tolerance),
+            are_few: matches < MANY,
             samples: Vec::new(),
             found: Essentials::new(),
         }),
@@ -71,6 +72,8 @@ impl Hypotheses {
 #[derive(Debug)]
 struct Lanes {
     solver: BatchSolver,
+    /// With few matches every hypothesis is looked at.
+    are_few: bool,
     samples: Vec<[u32; 5]>,
     found: Essentials,
 }
@@ -81,8 +84,8 @@ impl HypothesisSource for Lanes {
         #[expect(clippy::cast_possible_truncation, reason = "matches are counted by u32")]
         self.samples
             .extend(samples.iter().map(|sample| -> [u32; 5] { std::array::from_fn(|k| sample[k] as u32) }));
-        // With few matches every hypothesis is looked at. Every index is one of a match: there is no error.
-        let solved = if matches.len() < MANY {
+        // Every index is one of a match: there is no error.
+        let solved = if self.are_few {
             self.solver.solve(matches, &self.samples, &mut self.found)
         } else {
             self.solver.solve_oriented(matches, &self.samples, &mut self.found)

@@ -115,6 +115,8 @@ pub(crate) type IsChance<'a> = dyn FnMut(&ScoredPose, usize) -> bool + 'a;
 #[derive(Debug, Default)]
 struct Round {
     samples: Vec<Sample>,
+    /// The same by the caller's numbers of the matches.
+    given: Vec<Sample>,
     is_from_pool: Vec<bool>,
     hypotheses: Hypotheses,
 }
@@ -134,7 +136,7 @@ impl Round {
 /// The search for the best pose.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
-    observations: &'a Observations,
+    observations: &'a Observations<'a>,
     direction: Option<KnownDirection>,
     scorer: Scorer<'a>,
     poses: PoseScorer<'a>,
@@ -155,7 +157,7 @@ pub(crate) struct Search<'a> {
 
 impl<'a> Search<'a> {
     pub(crate) fn new(
-        observations: &'a Observations,
+        observations: &'a Observations<'a>,
         options: &Options,
         direction: Option<KnownDirection>,
     ) -> Self {
@@ -241,7 +243,10 @@ impl<'a> Search<'a> {
         let from_pools = round.is_from_pool.iter().filter(|is_from_pool| **is_from_pool).count();
         self.tries += round.samples.len() + (GUIDED - 1) * from_pools;
         round.hypotheses.clear();
-        source.hypotheses(&self.observations.matches, &round.samples, &mut round.hypotheses);
+        round.given.clear();
+        let given = |place: usize| self.observations.order[place] as usize;
+        round.given.extend(round.samples.iter().map(|sample| sample.map(given)));
+        source.hypotheses(self.observations.given, &round.given, &mut round.hypotheses);
         self.consider(round.hypotheses.matrices());
     }
 

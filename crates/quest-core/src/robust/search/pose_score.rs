@@ -62,20 +62,20 @@ impl ScoredPose {
 /// Scores poses.
 #[derive(Debug)]
 pub(crate) struct PoseScorer<'a> {
-    pub(crate) observations: &'a Observations,
+    pub(crate) observations: &'a Observations<'a>,
     loss: SearchScore,
     /// The memory of poses that are not needed any more.
     spare: Vec<(Residuals, Vec<u32>)>,
 }
 
 impl<'a> PoseScorer<'a> {
-    pub(crate) fn new(observations: &'a Observations, loss: SearchScore) -> Self {
+    pub(crate) fn new(observations: &'a Observations<'a>, loss: SearchScore) -> Self {
         let loss = if observations.len() < MANY { SearchScore::Truncated } else { loss };
         Self { observations, loss, spare: Vec::new() }
     }
 
     /// The same for other matches.
-    pub(crate) fn of<'b>(&self, observations: &'b Observations) -> PoseScorer<'b> {
+    pub(crate) fn of<'b>(&self, observations: &'b Observations<'b>) -> PoseScorer<'b> {
         PoseScorer::new(observations, self.loss)
     }
 

@@ -29,7 +29,7 @@ enum Columns {
 /// The search's score of essential matrices.
 #[derive(Debug)]
 pub(crate) struct Scorer<'a> {
-    observations: &'a Observations,
+    observations: &'a Observations<'a>,
     kernel: lanes::Scorer,
     loss: SearchScore,
     columns: Columns,
@@ -39,13 +39,13 @@ pub(crate) struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     /// `threshold` in pixels.
-    pub(crate) fn new(observations: &'a Observations, loss: SearchScore) -> Self {
+    pub(crate) fn new(observations: &'a Observations<'a>, loss: SearchScore) -> Self {
         let reach = REACH * observations.columns.threshold();
-        let matches = &observations.matches;
         let kernel = lanes::Scorer::new();
         if observations.is_sphere() {
             let mut columns = BearingMatches::new();
-            for m in matches {
+            for &i in &observations.order {
+                let m = &observations.given[i as usize];
                 columns.push((*m.bearing1()).into(), (*m.bearing2()).into());
             }
             // One angle for both views: an exact weight would have to know which view a residual comes from.
@@ -55,7 +55,7 @@ impl<'a> Scorer<'a> {
         }
         let mut columns = ImageMatches::new();
         let [x1, y1, _, x2, y2, _] = observations.columns.all();
-        for i in 0..matches.len() {
+        for i in 0..observations.len() {
             columns.push([x1[i], y1[i]], [x2[i], y2[i]]);
         }
         Self { observations, kernel, loss, columns: Columns::Plane(columns), reach }

@@ -26,7 +26,7 @@ impl HypothesisSource for Oracle {
 }
 
 struct Case {
-    observations: Observations,
+    matches: Vec<Correspondence>,
     truth: RelativePose,
 }
 
@@ -34,14 +34,14 @@ fn case(points: usize, outliers: f64) -> Case {
     let options = SceneOptions { points, noise_px: 0.5, ..SceneOptions::realistic() };
     let mut scene = Scene::generate(&options, SEED, 1).unwrap();
     scene.add_outliers(outliers, SEED, 1).unwrap();
-    let order = (0..points).collect();
-    let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
-    Case { observations, truth: scene.truth }
+    Case { matches: scene.matches, truth: scene.truth }
 }
 
 fn run(case: &Case, from: usize, limits: &Limits) -> (Option<Scored>, usize) {
     let options = Options { loss: SearchScore::Marginalised, ..Options::default() };
-    let mut search = Search::new(&case.observations, &options, None);
+    let order = (0..).take(case.matches.len()).collect();
+    let observations = Observations::new(&case.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
+    let mut search = Search::new(&observations, &options, None);
     let draws = Draws { rng: generator(SEED, 0), size: 5, given: None };
     let mut oracle = Oracle { essential: case.truth.essential(), from, asked: 0 };
     search.run(&mut oracle, draws, limits, &mut |_, _| false);
