@@ -1,6 +1,8 @@
 //! Which matches share a keypoint. A point is seen once in a view: of the matches of one keypoint at most one is true, and a match
 //! that is there twice says nothing twice.
 
+use hashbrown::HashTable;
+
 use crate::Correspondence;
 
 /// The keypoints of every match, one number for each keypoint of a view.
@@ -20,48 +22,30 @@ fn key(m: &Correspondence, view: usize) -> Key {
     <[f64; 3]>::from(*bearing).map(|x| (x + 0.0).to_bits())
 }
 
-/// The first match of each keypoint of a view, each at the place that its coordinates say or at the next that is free. Coordinates are
-/// looked up in the matches: with them a table for ten million matches would have half a gigabyte.
-struct Firsts {
-    /// A power of two of them, a third of them free.
-    places: Vec<u32>,
-    shift: u32,
-}
+/// The first match of each keypoint of a view. Coordinates are looked up in the matches: with them the table of ten million matches would
+/// have half a gigabyte.
+struct Firsts(HashTable<u32>);
 
 impl Firsts {
-    const FREE: u32 = u32::MAX;
-
     fn new(matches: usize) -> Self {
-        let size = (matches + matches / 2 + 2).next_power_of_two();
-        Self { places: vec![Self::FREE; size], shift: u64::BITS - size.trailing_zeros() }
-    }
-
-    /// Multiplies and rotates: bits of coordinates need no more, and a tenth of the time of an estimate would go into a hash that
-    /// withstands malice. The first bits of a product depend on all.
-    fn place_of(&self, key: Key) -> usize {
-        // 2^64 over the golden ratio.
-        let mix = |hash: u64, x: u64| (hash.rotate_left(23) ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let hash = key.into_iter().fold(0, mix);
-        #[expect(clippy::cast_possible_truncation, reason = "below the length of a list")]
-        let place = (hash >> self.shift) as usize;
-        place
+        Self(HashTable::with_capacity(matches))
     }
 
     /// The first match with the keypoint of a match, which is put there if there is none.
     fn first(&mut self, matches: &[Correspondence], view: usize, index: u32) -> u32 {
-        let own = key(&matches[index as usize], view);
-        let mut place = self.place_of(own);
-        loop {
-            match self.places[place] {
-                Self::FREE => {
-                    self.places[place] = index;
-                    return index;
-                }
-                first if key(&matches[first as usize], view) == own => return first,
-                _ => place = (place + 1) % self.places.len(),
-            }
-        }
+        let of = |i: u32| key(&matches[i as usize], view);
+        let own = of(index);
+        *self.0.entry(hash(own), |&other| of(other) == own, |&other| hash(of(other))).or_insert(index).get()
     }
+}
+
+/// Multiplies and rotates: bits of coordinates need no more, and a tenth of the time of an estimate would go into a hash that
+/// withstands malice.
+fn hash(key: Key) -> u64 {
+    // 2^64 over the golden ratio.
+    let mix = |hash: u64, x: u64| (hash.rotate_left(23) ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = key.into_iter().fold(0, mix);
+    mixed ^ (mixed >> 29)
 }
 
 impl Keypoints {
