@@ -57,7 +57,7 @@ def children() -> float:
 def of_files(files: list[Path]) -> pa.Table:
     """The poses of blocks, all columns of them but the name that only the tool writes."""
     table = pa.concat_tables([parquet.read_table(file) for file in files])
-    return table.drop_columns([name for name in table.column_names if name == "name"])
+    return table.select([name for name in table.column_names if name != "name"])
 
 
 ONE_PROCESS = """

@@ -119,10 +119,12 @@ def test_other_forms_go_in_as_they_are() -> None:
     plain = table(rows).select(["x1", "x2"])
     one = arrow.estimate(plain, threshold=500.0, max_iterations=300, max_false_alarms=np.inf, first_index=5)
     assert one.column("pair").to_pylist() == [5, 6, 7]
+    keyed = arrow.estimate(table(rows).drop_columns(["pair"]), indices=[row["pair"] for row in rows])
+    assert keyed.to_pylist() == found
 
 
 def spoiled(rows: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Rows each of which is no pair in another way, but for the last, and a word of the reason of each."""
+    """Rows most of which are no pairs, each in another way, and a word of the reason of each. The last three lack what a pair may lack."""
     faults: list[tuple[dict[str, Any], str]] = [
         ({"x1": None}, "x1: found null"),
         ({"x2": rows[1]["x2"][1:]}, "x2: found 20 points, expected 21"),
@@ -140,6 +142,9 @@ def spoiled(rows: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]
     for place, (change, word) in zip(places, faults, strict=True):
         made[place] |= change
         words[place] = word
+    made[10] |= {"score": None}
+    made[11] |= {"camera2": None}
+    made[12] |= {"x1": [*made[12]["x1"][:-1], [None, 1.0]]}
     return made, words
 
 
@@ -152,9 +157,6 @@ def of_any_length(rows: list[dict[str, Any]]) -> Any:
 
 def test_a_row_that_is_no_pair_costs_no_other_its_pose() -> None:
     rows, words = spoiled(pairs(13))
-    rows[10] |= {"score": None}
-    rows[11] |= {"camera2": None}
-    rows[12] |= {"x1": [*rows[12]["x1"][:-1], [None, 1.0]]}
     found = arrow.estimate(of_any_length(rows))
     assert found.schema == arrow.schema_out()
     for k, (one, word) in enumerate(zip(found.to_pylist(), words, strict=True)):
@@ -269,9 +271,6 @@ def test_the_tool_has_the_same_columns_and_bits(tmp_path: Path) -> None:
 def test_the_tool_says_what_a_pair_lacks(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     rows, words = spoiled(pairs(13))
-    rows[10] |= {"score": None}
-    rows[11] |= {"camera2": None}
-    rows[12] |= {"x1": [*rows[12]["x1"][:-1], [None, 1.0]]}
     parquet.write_table(of_any_length(rows), tmp_path / "pairs.parquet")
     with pytest.raises(subprocess.CalledProcessError) as error:
         tool("estimate", tmp_path / "pairs.parquet", "-o", tmp_path / "poses.parquet")

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from quest_pose._core import Camera, QuestError
 
 _MODELS = {"camera1": "params1", "camera2": "params2"}
+_COLUMNS = ["pair", "x1", "x2", *_MODELS, *_MODELS.values(), "score"]
 
 
-def pyarrow(module: str = "pyarrow") -> Any:
-    """A module of pyarrow's, which only tables need."""
+def load(module: str = "pyarrow") -> Any:
+    """pyarrow or a module of it, which only tables need."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -27,15 +28,17 @@ class Rows:
     ----------
     table : pyarrow.Table
         With the columns of ``arrow.schema_in()``.
-    first : int
-        The number of the first row, which is the key of a row that has none.
+    keys : array_like of int
+        The key of each row that has none of its own.
     """
 
-    def __init__(self, table: Any, first: int) -> None:
+    def __init__(self, table: Any, keys: Any) -> None:
         names = table.column_names
-        self._columns = {name: _column(table, name) for name in names}
+        self._names = names
+        # What other columns hold is not looked at.
+        self._columns = {name: table.column(name).combine_chunks() for name in _COLUMNS if name in names}
         count = table.num_rows
-        self.keys = _keys(self._columns.get("pair"), first, count)
+        self.keys = _keys(self._columns.get("pair"), keys)
         self.reasons = [""] * count
         self.is_pair = np.ones(count, dtype=bool)
         first_points, second_points = self._points("x1"), self._points("x2")
@@ -46,8 +49,9 @@ class Rows:
             self._score(first_points)
         self._cameras: dict[str, list[Camera | None]] = {}
         if "camera1" in names:
-            for name in [name for name in _MODELS if name in names]:
-                self._read_cameras(name)
+            for name in _MODELS:
+                if name in names:
+                    self._read_cameras(name)
 
     def arrays(self, rows: NDArray[np.int64]) -> tuple[Any, Any, Any, dict[str, Any]]:
         """``x1, x2, offsets`` of rows that are pairs, and the options of ``estimate_batch`` that go with them."""
@@ -71,10 +75,10 @@ class Rows:
 
     def _points(self, name: str) -> NDArray[np.int64]:
         """How many points each row of a column has."""
-        pa, pc = pyarrow(), pyarrow("pyarrow.compute")
+        pa, pc = load(), load("pyarrow.compute")
 
         if name not in self._columns:
-            raise QuestError(f"found the columns {list(self._columns)}, expected also {name}")
+            raise QuestError(f"found the columns {self._names}, expected also {name}")
         column = self._columns[name]
         if not _is_list(column.type) or not _is_list(column.type.value_type) or not _is_number(column.type.value_type.value_type):
             raise QuestError(f"the column {name} is of {column.type}, expected lists of points")
@@ -91,7 +95,7 @@ class Rows:
 
     def _flat_points(self, name: str, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """The points of rows, NaN for numbers that are null, and where each row begins."""
-        pc = pyarrow("pyarrow.compute")
+        pc = load("pyarrow.compute")
 
         column = _taken(self._columns[name], rows)
         points = column.flatten()
@@ -100,7 +104,7 @@ class Rows:
         return numbers.reshape(len(points), -1 if len(points) else 2), np.concatenate([[0], np.cumsum(lengths)])
 
     def _score(self, counts: NDArray[np.int64]) -> None:
-        pc = pyarrow("pyarrow.compute")
+        pc = load("pyarrow.compute")
 
         column = self._columns["score"]
         if not _is_list(column.type) or not _is_number(column.type.value_type):
@@ -119,7 +123,7 @@ class Rows:
         """A camera a row; equal ones are made once."""
         parameters = _MODELS[name]
         if parameters not in self._columns:
-            raise QuestError(f"found the columns {list(self._columns)}, expected also {parameters}")
+            raise QuestError(f"found the columns {self._names}, expected also {parameters}")
         models, params = self._columns[name].to_pylist(), self._columns[parameters].to_pylist()
         made: dict[tuple[str, tuple[float, ...]], Camera | str] = {}
         cameras: list[Camera | None] = [None] * len(models)
@@ -152,26 +156,18 @@ def _camera(name: str, model: str, params: tuple[float, ...]) -> Camera | str:
         return f"{name}: {error}"
 
 
-def _column(table: Any, name: str) -> Any:
-    pa = pyarrow()
-
-    column = table.column(name).combine_chunks()
-    # Tables of some versions keep a single chunk in its list.
-    return column.chunk(0) if isinstance(column, pa.ChunkedArray) else column
-
-
 def _taken(column: Any, rows: NDArray[np.int64]) -> Any:
     return column if len(rows) == len(column) else column.take(rows)
 
 
 def _is_list(kind: Any) -> bool:
-    pa = pyarrow()
+    pa = load()
 
     return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
 
 
 def _is_number(kind: Any) -> bool:
-    pa = pyarrow()
+    pa = load()
 
     return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind))
 
@@ -185,11 +181,11 @@ def _numbers(values: Any) -> NDArray[np.float64]:
     return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
-def _keys(column: Any, first: int, count: int) -> NDArray[np.uint64]:
-    """The keys of the rows, which are their numbers where there are none."""
-    pa = pyarrow()
+def _keys(column: Any, others: Any) -> NDArray[np.uint64]:
+    """The keys of the rows, those of ``others`` where there are none."""
+    pa = load()
 
-    numbers = np.arange(first, first + count, dtype=np.uint64)
+    numbers: NDArray[np.uint64] = np.asarray(others, dtype=np.uint64)
     if column is None:
         return numbers
     if not pa.types.is_integer(column.type):

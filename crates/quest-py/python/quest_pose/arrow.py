@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quest_pose._arrow_rows import Rows
-from quest_pose._arrow_rows import pyarrow as needed
+from quest_pose._arrow_rows import Rows, load
 from quest_pose._core import EstimateBatch, QuestError, estimate_batch
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ __all__ = ["estimate", "schema_in", "schema_out"]
 
 def schema_in() -> "pyarrow.Schema":
     """The columns of ``estimate``, as they are read without a copy."""
-    pa = needed()
+    pa = load()
 
     points = pa.list_(pa.list_(pa.float64(), 2))
     return pa.schema(
@@ -53,7 +52,7 @@ def schema_in() -> "pyarrow.Schema":
 
 def schema_out() -> "pyarrow.Schema":
     """The columns that ``estimate`` returns: null where a pair has no pose, and then its ``reason``."""
-    pa = needed()
+    pa = load()
 
     def vector(size: int) -> Any:
         return pa.list_(pa.float64(), size)
@@ -92,7 +91,8 @@ def estimate(batch: Any, *, num_threads: int = 1, **options: Any) -> "pyarrow.Re
     num_threads : int
         One by default: a worker of a cluster is one of many on its machine. All of the machine's for 0.
     options
-        Those of ``estimate_batch``. ``first_index`` is the number of the first row where there is no column ``pair``.
+        Those of ``estimate_batch``. Where there is no column ``pair``, ``first_index`` is the number of the first row, and
+        ``indices`` has the keys.
 
     Returns
     -------
@@ -107,9 +107,11 @@ def estimate(batch: Any, *, num_threads: int = 1, **options: Any) -> "pyarrow.Re
     QuestError
         For a column that is missing or of another form, and as ``estimate_batch``. A single row costs its own pose alone.
     """
-    pa = needed()
+    pa = load()
 
-    rows = Rows(_table(pa, batch), int(options.pop("first_index", 0)))
+    table = _table(pa, batch)
+    first = int(options.pop("first_index", 0))
+    rows = Rows(table, options.pop("indices", range(first, first + table.num_rows)))
     batches, places = [], []
     # Scores are given to all pairs of a batch or to none. The other pairs of a batch change no answer.
     for has_score in (False, True):

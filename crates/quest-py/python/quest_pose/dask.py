@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quest_pose import arrow
-from quest_pose._arrow_rows import pyarrow
+from quest_pose._arrow_rows import load
 
 __all__ = ["estimate_block", "estimate_parquet"]
 
@@ -56,7 +56,7 @@ def estimate_parquet(
     QuestError
         For a source without the columns.
     """
-    parquet = pyarrow("pyarrow.parquet")
+    parquet = load("pyarrow.parquet")
     source, target = Path(source), Path(target)
     target.mkdir(parents=True, exist_ok=True)
     files = sorted(source.glob("*.parquet")) if source.is_dir() else [source]
@@ -89,7 +89,7 @@ def estimate_block(
     str
         The file.
     """
-    pa, parquet = pyarrow(), pyarrow("pyarrow.parquet")
+    pa, parquet = load(), load("pyarrow.parquet")
     target = Path(target)
     if target.exists():
         return str(target)
