@@ -165,9 +165,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 impl Estimated {
     /// A line or a file that is no pair.
-    fn unreadable(key: u64, Unread { name, error }: Unread) -> Self {
-        let called = name.clone().unwrap_or_else(|| error.place.to_string());
-        let heading = words::one_line(&format!("{called}: no pose"));
+    fn unreadable(key: u64, unread: Unread) -> Self {
+        let heading = unread.heading();
+        let Unread { name, error } = unread;
         let record = EstimateRecord { key, ..EstimateRecord::unanswered(name, error.to_string()) };
         Self { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)) }
     }

@@ -80,6 +80,14 @@ pub(crate) struct Unread {
     pub(crate) error: ReadError,
 }
 
+impl Unread {
+    /// The line above its empty table.
+    pub(crate) fn heading(&self) -> String {
+        let called = self.name.clone().unwrap_or_else(|| self.error.place.to_string());
+        words::one_line(&format!("{called}: no pose"))
+    }
+}
+
 /// A file that is being read.
 enum Opened {
     Pairs(Pairs),

@@ -122,8 +122,8 @@ const ESTIMATE_COLUMNS: [&str; 19] = [
     "reason",
 ];
 
-/// One row of CSV for the estimate of the pair with number `pair`, counted from one. Without a pose
-/// they are empty but for the reason. The header comes before the row of the first pair.
+/// One row of CSV for the estimate of the pair with number `pair`, counted from one. Without a pose its fields are empty but for the
+/// reason. The header comes before the row of the first pair.
 pub(crate) fn write_estimate(writer: &mut dyn Write, pair: usize, record: &EstimateRecord) -> io::Result<()> {
     let mut row = vec![
         pair.to_string(),

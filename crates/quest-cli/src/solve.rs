@@ -186,9 +186,9 @@ impl Arguments {
     }
 
     /// The record of a line or a file that is no pair, or has matches that cannot be solved.
-    fn unreadable(&self, Unread { name, error }: Unread) -> Solved {
-        let called = name.clone().unwrap_or_else(|| error.place.to_string());
-        let heading = words::one_line(&format!("{called}: no pose"));
+    fn unreadable(&self, unread: Unread) -> Solved {
+        let heading = unread.heading();
+        let Unread { name, error } = unread;
         let record = SolveRecord::unanswered(name, self.solver_name(), error.to_string());
         Solved { heading, record, focal_length: None, refusal: Some(Refusal::Unreadable(error)), note: None }
     }
