@@ -171,9 +171,15 @@ fn goal_points(
     if found < needed {
         return Err(JsError::new(&format!("goal has {found} features, expected at least {needed}")));
     }
-    points.iter().map(|&p| point_on_plane(camera, p)).collect::<Option<_>>().ok_or_else(|| {
-        JsError::new("a feature of goal is not finite or has no viewing ray, expected one in front")
-    })
+    let on_plane = points.iter().enumerate().map(|(row, &p)| {
+        point_on_plane(camera, p).ok_or_else(|| {
+            let [u, v] = p;
+            JsError::new(&format!(
+                "row {row} of goal is ({u}, {v}), which is not finite or has no viewing ray in front; expected every feature to have one"
+            ))
+        })
+    });
+    on_plane.collect()
 }
 
 /// A pixel, or a point given so, on the plane z = 1.

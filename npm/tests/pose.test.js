@@ -114,4 +114,8 @@ test("the servo brings a camera home, and holds where features are lost", () => 
   assert.equal(lost.pose, null);
   assert.equal(lost.seen, 0);
   assert.throws(() => servo.step(new Float64Array(4)), /points has 2 rows, expected 8/);
+  const goal = Float64Array.from(seen([0, 0, 0]));
+  goal[7] = NaN;
+  const options = { maxSpeed: 0.3, maxTurnRate: 0.3, noise: 1e-4 };
+  assert.throws(() => new Servo(goal, options), /row 3 of goal is \(.*NaN\)/);
 });

@@ -24,6 +24,8 @@ pub struct Axis {
     /// The range; `None` takes the range of the data. A range from a larger to a smaller value runs backwards,
     /// like the v axis of an image.
     pub range: Option<[f64; 2]>,
+    /// Whether the axis of the data's range runs backwards.
+    pub backwards: bool,
 }
 
 impl Axis {
@@ -37,6 +39,12 @@ impl Axis {
     #[must_use]
     pub fn log(label: impl Into<String>) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label) }
+    }
+
+    /// Lets the axis of the data's range run backwards, like the v axis of an image.
+    #[must_use]
+    pub fn backwards(self) -> Self {
+        Self { backwards: true, ..self }
     }
 
     /// Sets the range.
@@ -55,6 +63,11 @@ impl Axis {
         if let Some(range) = self.range {
             return range;
         }
+        let [from, to] = self.extent_of(values);
+        if self.backwards { [to, from] } else { [from, to] }
+    }
+
+    fn extent_of(&self, values: impl Iterator<Item = f64>) -> [f64; 2] {
         let [low, high] = values
             .filter(|&v| self.shows(v))
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
@@ -225,5 +238,7 @@ mod tests {
         assert_eq!(given.map(f64::to_bits), [3.0, -1.0].map(f64::to_bits));
         let [low, high] = Axis::linear("").extent(std::iter::empty());
         assert!(low < high);
+        let [first, last] = Axis::log("").backwards().extent(values());
+        assert!(first > 100.0 && last < 1.0);
     }
 }

@@ -87,6 +87,14 @@ impl Panel {
         self
     }
 
+    /// The ranges of both axes: those that are set, else those of the data.
+    pub(crate) fn ranges(&self) -> [[f64; 2]; 2] {
+        let points = || self.series.iter().flat_map(|s| &s.points);
+        let bands = || self.series.iter().flat_map(|s| &s.band);
+        let heights = points().map(|p| p[1]).chain(bands().flat_map(|b| [b[1], b[2]]));
+        [self.x.extent(points().map(|p| p[0])), self.y.extent(heights)]
+    }
+
     /// One scale for both axes.
     #[must_use]
     pub fn equal_scales(self) -> Self {

@@ -56,6 +56,10 @@ pub(crate) fn from_argument(name: &str, given: &Bound<'_, PyAny>) -> PyResult<qu
     }
     match foreign_camera::read(name, given)? {
         Some(camera) => Ok(camera),
+        None if given.is_instance_of::<PyTuple>() && given.len()? == 2 => Err(BadCamera::new_err(format!(
+            "{name} is a tuple of two, expected a Camera or a matrix K of shape (3, 3); \
+             Camera.from_opencv(K, dist) takes the distortion of OpenCV too"
+        ))),
         None => from_k(name, given),
     }
 }

@@ -128,6 +128,9 @@ def test_opencv() -> None:
     for dist, fish, word in [([1.0] * 3, False, "3 coefficients"), ([0.1] * 12, False, "prism"), ([0.1] * 5, True, "0 or 4")]:
         with pytest.raises(qp.BadCamera, match=word):
             qp.Camera.from_opencv(k, dist, fisheye=fish)
+    both: Any = (k, [-0.1, 0.02, 1e-3, -2e-3])
+    with pytest.raises(qp.BadCamera, match="from_opencv"):
+        qp.estimate(PIXELS, PIXELS, both)
 
 
 def test_camera_info() -> None:

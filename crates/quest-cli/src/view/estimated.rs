@@ -53,14 +53,14 @@ pub(super) fn text(pair: &Pair, options: &Options, is_ply: bool) -> Result<Optio
 /// Each point of both images, with a line to where it is in the other one.
 fn images(pair: &Pair, found: &Estimate) -> Figure {
     let panel = |view: usize| {
-        let at = |row: &[f64; 4], k: usize| [row[2 * k], -row[2 * k + 1]]; // Upwards: v runs down.
+        let at = |row: &[f64; 4], k: usize| [row[2 * k], row[2 * k + 1]];
         let size = pair.cameras.and_then(|cameras| cameras[view].size());
         let axes = match size {
             Some((w, h)) => (
                 Axis::linear("u, px").range(0.0, f64::from(w)),
-                Axis::linear("−v, px").range(-f64::from(h), 0.0),
+                Axis::linear("v, px").range(f64::from(h), 0.0),
             ),
-            None => (Axis::linear("u"), Axis::linear("−v")),
+            None => (Axis::linear("u"), Axis::linear("v").backwards()),
         };
         let mut panel = Panel::new(format!("Image {}", view + 1), axes.0, axes.1);
         for (wanted, name, colour) in [(true, "inliers", INLIER), (false, "outliers", OUTLIER)] {
@@ -109,7 +109,7 @@ fn epipolar_curve(pair: &Pair, pose: &RelativePose, row: &[f64; 4], view: usize)
             None => (x.z > 0.0).then(|| [x.x / x.z, x.y / x.z]),
         }
     };
-    (0..=STEPS).filter_map(seen).filter(|pixel| is_inside(*pixel)).map(|[u, v]| [u, -v]).collect()
+    (0..=STEPS).filter_map(seen).filter(|pixel| is_inside(*pixel)).collect()
 }
 
 /// Both cameras, the inliers in space, and the second pose where there is one.

@@ -15,8 +15,13 @@ pub(super) fn plot(panel: &Panel) -> Plot {
         }
         plot.add_trace(curve(panel, series));
     }
-    let shown = |given: &Axis| if panel.is_bare { axis(given).visible(false).title("") } else { axis(given) };
-    let y = if panel.equal_scales { shown(&panel.y).scale_anchor("x") } else { shown(&panel.y) };
+    let [x, y] = panel.ranges();
+    let shown = |given: &Axis, range: [f64; 2]| {
+        let drawn = axis(given, range);
+        if panel.is_bare { drawn.visible(false).title("") } else { drawn }
+    };
+    let (x, y) = (shown(&panel.x, x), shown(&panel.y, y));
+    let y = if panel.equal_scales { y.scale_anchor("x") } else { y };
     let margin = if panel.is_bare {
         Margin::new().left(8).right(8).top(8).bottom(8)
     } else {
@@ -26,13 +31,13 @@ pub(super) fn plot(panel: &Panel) -> Plot {
         .show_legend(false)
         .hover_mode(HoverMode::Closest)
         .margin(margin)
-        .x_axis(shown(&panel.x))
+        .x_axis(x)
         .y_axis(y);
     plot.set_layout(layout);
     plot
 }
 
-fn axis(axis: &Axis) -> PlotlyAxis {
+fn axis(axis: &Axis, range: [f64; 2]) -> PlotlyAxis {
     let drawn = PlotlyAxis::new()
         .title(axis.label.as_str())
         .type_(if axis.scale == Scale::Log { AxisType::Log } else { AxisType::Linear })
@@ -41,7 +46,8 @@ fn axis(axis: &Axis) -> PlotlyAxis {
         .line_color(MUTED.hex())
         .exponent_format(ExponentFormat::Power)
         .auto_margin(true);
-    match axis.range {
+    // plotly's own range of the data runs forwards.
+    match axis.range.or(axis.backwards.then_some(range)) {
         // plotly wants the exponents of a logarithmic axis.
         Some([from, to]) if axis.scale == Scale::Log => drawn.range(AxisRange::new(from.log10(), to.log10())),
         Some([from, to]) => drawn.range(AxisRange::new(from, to)),

@@ -105,10 +105,7 @@ fn rounded(length: f64) -> i32 {
 
 /// The ranges of both axes, enlarged where the scales have to be equal.
 fn extents(panel: &Panel, [width, height]: [i32; 2]) -> [[f64; 2]; 2] {
-    let points = || panel.series.iter().flat_map(|s| &s.points);
-    let bands = || panel.series.iter().flat_map(|s| &s.band);
-    let x = panel.x.extent(points().map(|p| p[0]));
-    let y = panel.y.extent(points().map(|p| p[1]).chain(bands().flat_map(|b| [b[1], b[2]])));
+    let [x, y] = panel.ranges();
     if !panel.equal_scales {
         return [x, y];
     }

@@ -38,11 +38,9 @@ pub(super) fn drawn(summary: &Summary, run: &Recorded, is_svg: bool) -> Result<S
 }
 
 fn paths(run: &Recorded) -> Panel {
-    // Upwards, the image's v runs down.
-    let upright = |p: [f64; 2]| [p[0], -p[1]];
     let axes = run.size.map_or_else(
-        || (Axis::linear("x"), Axis::linear("−y")),
-        |[w, h]| (Axis::linear("u, px").range(0.0, w), Axis::linear("−v, px").range(-h, 0.0)),
+        || (Axis::linear("x"), Axis::linear("y").backwards()),
+        |[w, h]| (Axis::linear("u, px").range(0.0, w), Axis::linear("v, px").range(h, 0.0)),
     );
     let every = run.goal.len().div_ceil(PATHS).max(1);
     let shown = || (0..run.goal.len()).step_by(every);
@@ -51,17 +49,17 @@ fn paths(run: &Recorded) -> Panel {
     let is_out =
         |image: &Image, k: usize| image.pose.is_some() && image.used.as_ref().is_some_and(|used| !used[k]);
     for k in shown() {
-        let on_path = |image: &Image| if is_out(image, k) { [f64::NAN; 2] } else { upright(image.points[k]) };
+        let on_path = |image: &Image| if is_out(image, k) { [f64::NAN; 2] } else { image.points[k] };
         lines.extend(run.images.iter().map(on_path));
         // The next path begins elsewhere.
         lines.push([f64::NAN; 2]);
     }
     let left_out = run.images.iter().flat_map(|image| {
         let out = shown().filter(move |&k| is_out(image, k));
-        out.map(|k| upright(image.points[k])).filter(|p| p[0].is_finite())
+        out.map(|k| image.points[k]).filter(|p| p[0].is_finite())
     });
-    let first = run.images.iter().take(1).flat_map(|image| shown().map(|k| upright(image.points[k])));
-    let goal = shown().map(|k| upright(run.goal[k])).collect();
+    let first = run.images.iter().take(1).flat_map(|image| shown().map(|k| image.points[k]));
+    let goal = shown().map(|k| run.goal[k]).collect();
     Panel::new("Features in the image", axes.0, axes.1)
         .with(Series::line("paths", lines).coloured(colour::nth(4)).labelled(""))
         .with(Series::points("left out", left_out.collect()).coloured(LEFT_OUT))
