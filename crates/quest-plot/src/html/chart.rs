@@ -27,12 +27,8 @@ pub(super) fn plot(panel: &Panel) -> Plot {
     } else {
         Margin::new().left(64).right(12).top(8).bottom(48)
     };
-    let layout = Layout::new()
-        .show_legend(false)
-        .hover_mode(HoverMode::Closest)
-        .margin(margin)
-        .x_axis(x)
-        .y_axis(y);
+    let layout =
+        Layout::new().show_legend(false).hover_mode(HoverMode::Closest).margin(margin).x_axis(x).y_axis(y);
     plot.set_layout(layout);
     plot
 }
