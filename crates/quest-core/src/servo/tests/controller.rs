@@ -115,7 +115,7 @@ fn scaled(twist: &Twist, by: f64) -> Twist {
 fn what_supports_the_pose_decides_the_state_and_the_speed() {
     let cases = [
         (Support::Full, State::Tracking, "tracking", 1.0),
-        (Support::Several, State::Ambiguous, "ambiguous", 0.4),
+        (Support::Several, State::Ambiguous, "ambiguous", 0.2),
         (Support::Unconfirmed, State::Confirming, "confirming", 0.3),
     ];
     for (support, state, name, share) in cases {

@@ -182,6 +182,8 @@ impl Consensus {
             if new.score >= worst || new.score.is_nan() {
                 return;
             }
+        } else if !self.is_in_front(&pose, sigma) {
+            return;
         }
         let same = |p: &RelativePose| {
             p.rotation_error(&pose) < 2e-2 && p.translation_error(&pose).is_none_or(|angle| angle < 0.1)
@@ -195,6 +197,16 @@ impl Consensus {
         }
         let score = |x: &Option<Scored>| x.map_or(f64::INFINITY, |scored| scored.score);
         self.best.sort_by(|a, b| score(a).total_cmp(&score(b)));
+    }
+
+    /// Whether more of the matches that agree are in front of both cameras than not.
+    ///
+    /// A pose and its twisted pair have the same Sampson errors: rounding decided which of them was the best.
+    fn is_in_front(&self, pose: &RelativePose, sigma: f64) -> bool {
+        let agree = self.matches.iter().filter(|m| (pose.sampson_error(m) / sigma).powi(2) < AGREES);
+        let balance =
+            agree.filter_map(|m| pose.depths(m)).map(|(z1, z2)| if z1 > 0.0 && z2 > 0.0 { 1 } else { -1 });
+        balance.sum::<i32>() > 0
     }
 
     /// The score of a pose with what the depths say: those of a match that agrees are positive and near their mean.
@@ -226,5 +238,47 @@ impl Consensus {
             agree += usize::from(agrees);
         }
         Scored { pose: *pose, score, agree }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+    use rand::SeedableRng;
+
+    use super::*;
+
+    #[test]
+    fn a_twisted_pair_is_not_among_the_poses_of_many_matches() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(7);
+        let truth =
+            RelativePose::new(UnitQuaternion::new(Vector3::new(0.1, -0.2, 0.1)), Vector3::new(0.3, 0.1, 0.1));
+        let points: Vec<Vector3<f64>> = (0..40)
+            .map(|_| {
+                Vector3::new(
+                    rng.random_range(-1.0..1.0),
+                    rng.random_range(-1.0..1.0),
+                    rng.random_range(3.0..5.0),
+                )
+            })
+            .collect();
+        let goal: Vec<[f64; 2]> = points.iter().map(|x| [x.x / x.z, x.y / x.z]).collect();
+        let seen = points.iter().map(|x| truth.q_21 * x + truth.t_21).map(|x| Some([x.x / x.z, x.y / x.z]));
+        let seen: Vec<_> = seen.collect();
+        // Turned by 180° about the baseline, in either direction of it.
+        let half_turn =
+            UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(truth.t_21), std::f64::consts::PI);
+        let turned = half_turn * truth.q_21;
+        for (pose, is_true) in [
+            (RelativePose::new(turned, truth.t_21), false),
+            (RelativePose::new(turned, -truth.t_21), false),
+            (RelativePose::new(truth.q_21, -truth.t_21), false),
+            (truth, true),
+        ] {
+            let mut consensus = Consensus::new(40);
+            consensus.begin(&goal, &seen, |_| true);
+            consensus.offer(pose, 1e-3);
+            assert_eq!(consensus.best[0].is_some(), is_true, "{pose:?}");
+        }
     }
 }
