@@ -21,8 +21,8 @@ use crate::{Candidates, Correspondence};
 pub enum Tolerance {
     /// To rounding: Newton's iteration on the motion itself, as in [`Quest`].
     Tight,
-    /// For a robust loop: as the roots of the polynomial give them, which is far below the noise of any image. The constraints
-    /// `x2ᵀ E x1 = 0` of the sample hold to rounding, and the two singular values are equal to about 1e-6.
+    /// For a robust loop: as the roots of the polynomial give them. Their errors are far below the noise of any image. The
+    /// constraints `x2ᵀ E x1 = 0` of the sample hold to rounding, and the two singular values are equal to about 1e-6.
     Loop,
 }
 
@@ -32,7 +32,7 @@ pub enum Tolerance {
 pub struct SampleError {
     /// The sample, counted from zero.
     pub sample: usize,
-    /// What it names.
+    /// The index that the sample names.
     pub index: u32,
     /// How many matches there are.
     pub matches: usize,
@@ -40,7 +40,7 @@ pub struct SampleError {
 
 /// Solves many samples of five matches, several at a time.
 ///
-/// No memory is taken from the heap once the output has grown to the largest batch.
+/// Nothing is allocated once the output has grown to the largest batch.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchSolver {
     tolerance: Tolerance,
@@ -66,10 +66,10 @@ impl BatchSolver {
         self.token.instructions()
     }
 
-    /// Fills `out` with the essential matrices of each sample of `matches`, given by indices.
+    /// Fills `out` with the essential matrices of each sample: five indices of `matches`.
     ///
-    /// Where [`Essentials::is_complete`] is false for a sample some of its matrices may be missing: a robust loop takes another
-    /// sample, and who needs them all calls [`solve_all`](Self::solve_all).
+    /// Some matrices of a sample may be missing where [`Essentials::is_complete`] is false for it. A robust loop takes another
+    /// sample then. A caller that needs all matrices calls [`solve_all`](Self::solve_all).
     ///
     /// # Errors
     /// [`SampleError`] for an index beyond the matches; `out` is empty then.
@@ -82,9 +82,9 @@ impl BatchSolver {
         self.run(Rest::Flagged, matches, samples, out)
     }
 
-    /// The same for a robust loop, which wants poses and does not ask whether a sample is complete: of its essential matrices those
-    /// alone that have a pose with all five points in front of both cameras, as far as that is clear of noise, and roots that
-    /// are counted once. One in ten of the matrices of false matches is left.
+    /// The same for a robust loop, which wants poses and does not ask whether a sample is complete. An essential matrix is kept
+    /// only if it passes the cheirality test as far as that is clear of noise: one of its poses has all five points in front of
+    /// both cameras. Every root is counted once. One in ten of the matrices of false matches is left.
     pub(crate) fn solve_oriented(
         self,
         matches: &[Correspondence],
@@ -94,8 +94,8 @@ impl BatchSolver {
         self.run(Rest::Unasked, matches, samples, out)
     }
 
-    /// The same, with the samples that are not complete solved again by [`Quest`]. Every sample is complete then; one without
-    /// a matrix has no real solution, or is degenerate.
+    /// As [`solve`](Self::solve), but [`Quest`] solves again the samples that are not complete. Every sample is complete then; one
+    /// without a matrix has no real solution, or is degenerate.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -124,7 +124,7 @@ impl BatchSolver {
     }
 }
 
-/// What becomes of samples that lanes cannot solve for sure.
+/// What becomes of samples that the lanes may not have solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Rest {
     /// They are not complete, and say so.

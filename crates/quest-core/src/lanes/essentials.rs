@@ -11,7 +11,8 @@ use crate::{Candidate, CandidateKind, Candidates, Correspondence};
 
 /// The essential matrices of many samples, in structure of arrays.
 ///
-/// They stand one sample after the other: [`of`](Self::of) gives the range of each. A buffer to be used again.
+/// They stand one sample after the other; [`of`](Self::of) gives the range of each. It is a buffer: use it again for the next
+/// batch.
 #[derive(Clone, Debug)]
 pub struct Essentials {
     /// Where the matrices of each sample begin, and the end of the last.
@@ -63,9 +64,9 @@ impl Essentials {
         end(sample)..end(sample + 1)
     }
 
-    /// Whether the essential matrices of a sample are known to be all of them.
+    /// Whether all essential matrices of a sample are known to be there.
     ///
-    /// Where they are not, some may be missing, or the sample may be degenerate.
+    /// If not, some may be missing, or the sample may be degenerate.
     #[must_use]
     pub fn is_complete(&self, sample: usize) -> bool {
         self.complete.get(sample).copied().unwrap_or(false)
@@ -87,8 +88,8 @@ impl Essentials {
         Some(([unit(q), unit(twisted(&q, &t))], Vector3::from(t).normalize()))
     }
 
-    /// Fills `out` with both poses of each essential matrix of a sample, given its matches: what a solver returns for them with
-    /// [`Kinds::Exact`](crate::solver::Kinds::Exact), in the same order.
+    /// Fills `out` with both poses of each essential matrix of a sample. `matches` are the sample's. The candidates and their order
+    /// are those of a solver with [`Kinds::Exact`](crate::solver::Kinds::Exact).
     pub fn candidates(&self, sample: usize, matches: &[Correspondence], out: &mut Candidates) {
         out.clear();
         for (rotations, direction) in self.of(sample).filter_map(|k| self.motions(k)) {

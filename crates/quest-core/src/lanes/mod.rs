@@ -1,8 +1,8 @@
 //! Many minimal problems at once, one in each lane of a vector register.
 //!
-//! A robust estimator needs the essential matrices of thousands of samples of five matches, and the score of each over all
-//! matches. Both are the same arithmetic on independent data, which vector instructions do for two, four or eight
-//! of them at once:
+//! A robust estimator needs the essential matrices of thousands of samples of five matches, and the score of each over all matches.
+//! Both are the same arithmetic on independent data. Vector instructions do it for two, four or eight samples or matches at once,
+//! and in `f32` for up to sixteen:
 //!
 //! - [`BatchSolver`]: samples of five matches in, [`Essentials`] out, in structure of arrays.
 //! - [`Scorer`]: an essential matrix and all matches in ([`ImageMatches`], [`BearingMatches`]), a [`Score`] or a mask of
@@ -43,13 +43,14 @@
 //! | `solver/shared/newton_lanes.rs` | rotation and translation, Newton's iteration |
 //! | `batch.rs` | all of it, for groups of samples |
 //!
-//! What a scalar solver decides by branches is decided here by masks, or not at all: no pivoting, no second attempt. A lane
-//! that needs one is flagged, in less than a hundredth of samples, and left to the scalar solver. No lane looks at another,
-//! so that the result for a sample does not depend on its place, its neighbours or the size of the batch.
+//! What a scalar solver decides by branches is decided here by masks, or not at all: there is no pivoting and no second attempt. A
+//! lane that needs one is flagged and left to the scalar solver; these are less than a hundredth of the samples. No lane looks at
+//! another. So the result for a sample does not depend on its place, its neighbours or the size of the batch.
 //!
-//! A mask is a truth value for each lane. The groups of samples are padded to whole registers by repeating the last sample; the
-//! roots are taken slot by slot, as many slots as the lane with the most roots needs, and the others compute there with
-//! harmless numbers that are not kept. An iteration ends when no lane needs it any more, and what has arrived does not move.
+//! A mask is a truth value for each lane. A group of samples is padded to whole registers by repeating its last sample. The roots
+//! are taken slot by slot, in as many slots as the lane with the most roots needs; a lane without a root in a slot computes with
+//! harmless numbers that are not kept. An iteration ends when no lane needs it any more, and a lane that has converged does not
+//! move.
 //!
 //! The lanes are those of `algebra::vectors`: `vector.rs` (AVX2, AVX-512) and `sse2.rs` by pulp, `portable.rs` for other processors;
 //! `twice.rs` takes two roots of every sample at once.

@@ -40,9 +40,9 @@
 //! | [`World`] | the simulated loop, its images and their disturbances | [`closed_loop`], [`scenario`] |
 //!
 //! # The scale
-//! Two images do not tell metres. If `t` is normalised by the depths of the *goal's* view, which are the same in every frame, it has
-//! the same unknown unit in the whole run, and a proportional law works with it. If it is normalised by the depths of both views, the
-//! unit changes on the way. If it has the unit norm of an essential matrix, nothing goes to zero.
+//! Two images do not tell metres. The depths of the *goal's* view are the same in every frame. If `t` is normalised by them, it has
+//! the same unknown unit in the whole run, and a proportional law works with it. If `t` is normalised by the depths of both views,
+//! its unit changes on the way. If `t` has the unit norm that an essential matrix gives it, it never goes to zero.
 //!
 mod controller;
 mod estimators;

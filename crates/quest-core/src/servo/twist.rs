@@ -15,7 +15,7 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// Standing still.
+    /// Zero velocity.
     #[must_use]
     pub fn zero() -> Self {
         Self { linear: Vector3::zeros(), angular: Vector3::zeros() }
@@ -34,7 +34,7 @@ impl Twist {
     }
 }
 
-/// The largest velocities that a robot may be told.
+/// The largest velocities that are commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// In metres per second.
@@ -44,8 +44,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The twist within both limits, both parts slowed by the same factor so that the path stays the same.
-    /// What is not finite becomes standing still.
+    /// The twist, slowed until it is within both limits. Both parts are slowed by the same factor, so that the path stays the same.
+    /// A twist that is not finite becomes zero.
     #[must_use]
     pub fn apply(&self, twist: &Twist) -> Twist {
         let factor = self.factor(twist);

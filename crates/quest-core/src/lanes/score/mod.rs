@@ -31,23 +31,23 @@ use kernel::{Inliers, Sum};
 
 use crate::algebra::vectors::instructions::{Instructions, Token};
 
-/// When the matches that are left are not looked at any more. Asked after every 64 matches.
+/// When to stop before the last match. It is asked after every 64 matches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Stop {
     /// Never.
     #[default]
     Never,
-    /// When the score cannot reach this any more, if every further match counted one.
+    /// When the score could not reach this even if every further match counted one.
     CannotReach(f64),
-    /// When after `m` matches the score is below `m s − 3 √(m s (1 − s))`, with `s` this mean score of a match: a matrix as good
-    /// as that is lost once in a few hundred times. For matches in random order.
+    /// When the score after `m` matches is below `m s − 3 √(m s (1 − s))`, with `s` this mean score of a match. A matrix as good as
+    /// that is lost once in a few hundred times. The matches must be in random order.
     Unlikely(f64),
 }
 
 /// What [`Scorer::score`] finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
-    /// The sum over the matches that were looked at: at most one each.
+    /// The sum over the matches that were looked at. Each of them counts at most one.
     pub sum: f64,
     /// How many those were; all of them unless it stopped early.
     pub visited: usize,
@@ -80,7 +80,7 @@ impl Scorer {
 
     /// The score of the matrix `e`, row by row, at a threshold in the unit of the points.
     ///
-    /// It is good to the rounding of the numbers; of `f32` with AVX-512 residuals are good to 5e-6 of them.
+    /// It is exact to the rounding of `T`. With `f32` and AVX-512 the relative error of a residual is at most 5e-6.
     #[must_use]
     pub fn score<T: Real>(
         &self,
@@ -93,8 +93,8 @@ impl Scorer {
         T::run(self.token, Sum { matches, e: e.map(T::from_f64), threshold, loss, stop })
     }
 
-    /// Sets bit `k % 64` of `mask[k / 64]` where match `k` is an inlier of the matrix `e`, clears all others, and returns how many
-    /// there are. `mask` is made as long as it has to be.
+    /// Sets bit `k % 64` of `mask[k / 64]` where match `k` is an inlier of the matrix `e`, and clears all other bits. `mask` is
+    /// made as long as it has to be. Returns the number of inliers.
     pub fn inliers<T: Real>(
         &self,
         matches: &impl MatchColumns<T>,

@@ -87,7 +87,7 @@ pub(super) trait WithWorth {
 
 /// What an inlier counts, by the threshold `T`, its error `e` and the square of its gradient `g²`, with `T u = e/g`.
 ///
-/// Not a function that is handed over: what calls such a one may be compiled for the instructions that every processor has.
+/// This is a type and no closure: a loop that calls a closure may be compiled for the instructions that every processor has.
 pub(super) trait Worth {
     fn of_inlier<T: Real, V: Float<T>>(threshold: V, error: V, square_gradient: V) -> V;
 }

@@ -1,9 +1,9 @@
 //! The ten cubics reduced to six rows by Gaussian elimination.
 //!
-//! Pivoting would choose other rows in every lane. The rows stay in their order instead, which is as good as any other where the basis of
-//! the null space has no preferred direction; a lane whose pivots differ too much is flagged. Householder reflections need no choice
-//! either, and take twice the products. Only the rows of the reduced matrix that are led by `x²z, x²w, y²z, y²w, xyz, xyw` are used, so that
-//! back substitution stops there.
+//! Pivoting would choose other rows in every lane. The rows stay in their order instead, which is as good as any other where the
+//! basis of the null space has no preferred direction. A lane whose pivots differ too much is flagged. Householder reflections need
+//! no pivots either, but take twice the products. Only the rows of the reduced matrix that are led by `x²z, x²w, y²z, y²w, xyz,
+//! xyw` are used, so that back substitution stops there.
 //!
 //! A column is loaded once, takes all steps of the elimination in registers, and its pivot makes the next step.
 

@@ -65,10 +65,10 @@ pub(crate) fn frame<L: Lanes<f64>>(
     (Frame { r0_21, parallax }, rows)
 }
 
-/// The bearings `b` with the signs that let a rotation align them as lines: a point behind camera 2 has the opposite bearing.
+/// The bearings `b`, with the signs by which a rotation aligns them as lines. A point behind camera 2 has the opposite bearing.
 ///
-/// A rotation preserves angles, so that those to the first match tell all signs but a common one, which the scalar
-/// solver tells by the determinant of the correlation; so does this.
+/// A rotation preserves angles, so the angles to the first match tell all signs but a common one. The determinant of the
+/// correlation tells that one, here as in the scalar solver.
 #[inline(always)]
 fn with_signs<L: Lanes<f64>>(lanes: L, a: &[Vector3<L>; 5], b: &[Vector3<L>; 5]) -> [Vector3<L>; 5] {
     let zero = lanes.splat(0.0);

@@ -6,9 +6,9 @@
 //! 1. Its value and slope at [`ANGLES`] equal steps of `φ` make a cubic in every cell between two of them. The signs of the
 //!    four Bernstein coefficients of all cubics are collected as bits of words in every lane. The angles `±φ, π ± φ` share
 //!    their products.
-//! 2. Without a change of sign among the four a cell has no root, with one it has one. With more the cell is
-//!    divided where the cubic turns around, until each part has one or none; so few cells need that, that it is done lane by
-//!    lane.
+//! 2. A cell without a change of sign among the four has no root, and one with a single change has one root. A cell with more
+//!    changes is divided where the cubic turns around, until each part has one root or none. Few cells need that, so it is done
+//!    lane by lane.
 
 use std::sync::LazyLock;
 

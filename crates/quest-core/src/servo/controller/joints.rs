@@ -9,16 +9,16 @@ use crate::servo::twist::Twist;
 pub struct JointLimits<'a> {
     /// The largest speed of each joint, in its unit per second.
     pub speeds: &'a [f64],
-    /// Where each joint is and between which ends it may be; empty for joints without ends.
+    /// The position and the ends of each joint; empty for joints without ends.
     pub positions: &'a [JointPosition],
-    /// A joint may not come closer to its end than it would in this many seconds.
+    /// At its velocity a joint would need at least this many seconds to its end.
     pub seconds: f64,
 }
 
-/// Where a joint is.
+/// The position and the ends of a joint, in radians or metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointPosition {
-    /// Now, in radians or metres.
+    /// Where it is now.
     pub now: f64,
     /// The lower end.
     pub least: f64,
@@ -26,14 +26,16 @@ pub struct JointPosition {
     pub most: f64,
 }
 
-/// The velocities of the joints that make a twist, by damped least squares: `q̇ = Jᵀ (J Jᵀ + μ² I)⁻¹ (v, w)`.
+/// The joint velocities that produce a twist, by damped least squares: `q̇ = Jᵀ (J Jᵀ + μ² I)⁻¹ (v, w)`.
 ///
-/// `jacobian` has a column a joint: the twist, linear part first, that the joint makes with velocity one, in the frame of the twist.
-/// `damping` is μ: 0.05 keeps the joints slow where the arm is stretched out. All velocities are slowed by the same factor until each is
-/// within its limits, so that the hand keeps its direction. The result is written to `out`, a number a joint.
+/// `jacobian` has one column for each joint: the twist that the joint produces at velocity one, linear part first, in the frame of
+/// `twist`. `damping` is μ; with 0.05 the joints stay slow where the arm is stretched out. The result is written to `out`, one
+/// velocity for each joint. All velocities are slowed by the same factor until each is within its limits, so that the hand keeps
+/// its direction.
 ///
-/// Returns the factor, zero where the input is not finite or has the wrong lengths: the joints then stand still. Nakamura and Hanafusa,
-/// *Inverse kinematic solutions with singularity robustness for robot manipulator control* (1986).
+/// Returns that factor. It is zero where the input is not finite or has the wrong lengths: the joints then stand still.
+///
+/// After Nakamura and Hanafusa, *Inverse kinematic solutions with singularity robustness for robot manipulator control* (1986).
 pub fn joint_velocities(
     twist: &Twist,
     jacobian: &[[f64; 6]],

@@ -44,7 +44,7 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// The seconds since the last image, which takes over this stamp; `None` for a stale image.
+    /// The seconds since the last image; `None` for a stale image. Any other becomes the last image.
     pub(crate) fn seconds_since(&mut self, stamp: f64, now: f64, rig: &Rig, safety: &Safety) -> Option<f64> {
         self.images += 1;
         let seconds = if self.images == 1 { rig.period } else { stamp - self.time };
@@ -56,7 +56,7 @@ impl Memory {
         Some(seconds)
     }
 
-    /// How the camera should have moved by the last command in this many seconds.
+    /// The motion that the last command should have produced in this many seconds.
     pub(crate) fn motion(&self, seconds: f64, unit: f64) -> Motion {
         Motion {
             linear: self.camera_command.linear * (seconds / unit),
@@ -81,7 +81,7 @@ impl Memory {
         Twist { linear: self.command.linear + by.linear, angular: self.command.angular + by.angular }
     }
 
-    /// Towards standing still, as fast as the acceleration allows.
+    /// Brings the command towards zero, as fast as the acceleration allows.
     pub(crate) fn slow_down(&mut self, safety: &Safety, seconds: f64) {
         self.command = self.accelerated(&Twist::zero(), safety, seconds);
     }

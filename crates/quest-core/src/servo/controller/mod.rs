@@ -16,19 +16,22 @@ use rig::{Mount, Rig};
 use safety::Safety;
 use state::{State, Status, Step};
 
-/// The share of its speed with which the best of several hypotheses is followed while they command different things: slow enough that
-/// a wrong one is found out before it has gone far. With 0.4 twice as many of the starts with six features went astray, with 0.1 as many.
+/// While several hypotheses command different things, the best one is followed at this share of its speed. That is slow enough to
+/// find out a wrong one before the camera has gone far. With 0.4 twice as many of the starts with six features went astray, with 0.1
+/// as many.
 const AMBIGUOUS_SPEED: f64 = 0.2;
 
-/// How slowly a pose is followed until the camera is seen to go where it is sent: a second at 10 Hz, and a few centimetres.
+/// A pose is followed at this share of its speed until the camera is seen to go where it is sent: for a second at 10 Hz, over a few
+/// centimetres.
 const CONFIRMING_SPEED: f64 = 0.3;
 
-/// The number of divergences after which the loop holds until it is reset: each took the camera a little further from its goal.
+/// After so many divergences the loop holds until it is reset. Each of them took the camera a little further from its goal.
 const MOST_DIVERGENCES: usize = 3;
 
 /// A closed loop's controller: an image in, a command out.
 ///
-/// Where the pose cannot be trusted it commands standing still and says why; it goes on by itself once it can.
+/// Where the pose cannot be trusted, the controller commands zero velocity and says why. It goes on by itself once there is a pose
+/// to trust.
 #[derive(Clone, Debug)]
 pub struct Servo<E, L> {
     estimator: E,
@@ -63,8 +66,10 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         Self { rig, ..self }
     }
 
-    /// The command for one image: one entry for each feature of the goal, in the same order, on the plane z = 1 of the
-    /// current camera; `None` where it is not seen. The image comes one period after the last one. Takes nothing from the heap.
+    /// The command for one image. `features` has one entry for each feature of the goal, in the same order: its point on the plane
+    /// z = 1 of the current camera, or `None` where it is not seen.
+    ///
+    /// The image is taken to come one [`Rig::period`] after the last one. Nothing is allocated.
     pub fn step(&mut self, features: &[Option<[f64; 2]>]) -> Step {
         let stamp = self.memory.time + self.rig.period;
         self.step_at(features, stamp, stamp)
@@ -72,8 +77,8 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
 
     /// As [`step`](Self::step), for an image that was taken at `stamp` and is worked on at `now`, in seconds of one clock.
     ///
-    /// An image whose stamp is not later than the last one's, or which is older than [`Safety::largest_gap`], is stale: it is
-    /// not looked at, and the loop holds.
+    /// An image is stale if its stamp is not later than the last one's, or if it is older than [`Safety::largest_gap`]. A stale
+    /// image is not looked at, and the loop holds.
     pub fn step_at(&mut self, features: &[Option<[f64; 2]>], stamp: f64, now: f64) -> Step {
         let Some(seconds) = self.memory.seconds_since(stamp, now, &self.rig, &self.safety) else {
             return self.hold(features, HoldReason::Stale, self.rig.period);
@@ -89,9 +94,9 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         }
     }
 
-    /// What to do where no image comes: the command of [`step`](Self::step) is for one period only. To be called at the rate of
-    /// the robot's own control; after [`Safety::largest_gap`] without an image it commands standing still. `now` is on the clock of the
-    /// stamps.
+    /// The command while no image comes. [`step`](Self::step) answers for one period only, so call this at the rate of the robot's
+    /// own control. The last command goes on until there was no image for [`Safety::largest_gap`]; then it goes to zero. `now` is
+    /// on the clock of the stamps.
     pub fn idle(&mut self, now: f64) -> Twist {
         if now - self.memory.time > self.safety.largest_gap {
             self.memory.slow_down(&self.safety, self.rig.period);
@@ -111,7 +116,7 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         &self.estimator
     }
 
-    /// The estimator, to be told depths.
+    /// The estimator, for instance to give it depths.
     pub fn estimator_mut(&mut self) -> &mut E {
         &mut self.estimator
     }
@@ -121,17 +126,17 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         &self.law
     }
 
-    /// The control law, to be given other gains.
+    /// The control law, for instance to give it other gains.
     pub fn law_mut(&mut self) -> &mut L {
         &mut self.law
     }
 
-    /// The limits and guards, to be changed.
+    /// The limits and guards, to change them.
     pub fn safety_mut(&mut self) -> &mut Safety {
         &mut self.safety
     }
 
-    /// How the loop is built, to be changed: its unit where metric depths come later.
+    /// How the loop is built, for instance to set its unit once metric depths are known.
     pub fn rig_mut(&mut self) -> &mut Rig {
         &mut self.rig
     }
@@ -152,7 +157,7 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
                 || within(variance(3), self.safety.translation_uncertainty))
     }
 
-    /// What the law lets fall.
+    /// The law's potential at a pose.
     fn potential(&self, pose: &RelativePose) -> Option<f64> {
         self.law.potential(&self.rig.axes.of_pose(pose))
     }
@@ -200,7 +205,7 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         self.finish(features, command, &Ok(*estimate), state, border_limits)
     }
 
-    /// The command for an image without a pose: the last one, or towards standing still.
+    /// The command for an image without a pose: the last command, or one closer to zero.
     fn hold(&mut self, features: &[Option<[f64; 2]>], reason: HoldReason, seconds: f64) -> Step {
         let coasts = self.memory.may_coast(reason, &self.safety);
         self.memory.held(Some(reason), seconds);
@@ -239,7 +244,8 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         Step { command, estimate: *estimate, state, status }
     }
 
-    /// The command within the border, the free axes and the limits, in the frame that is commanded; and whether the border changed it.
+    /// The command within the border, the free axes and the limits, in the frame that is commanded. The second value is whether the
+    /// border changed it.
     fn guarded(&mut self, twist: Twist, features: &[Option<[f64; 2]>], state: State) -> (Twist, bool) {
         let mut twist = twist;
         let mut border_limits = false;

@@ -52,8 +52,8 @@ impl Mount {
         Twist { linear: inverse * (body.linear - p.cross(&body.angular)), angular: inverse * body.angular }
     }
 
-    /// What a law of a base is told: the pose of the base relative to where it is at the goal. `unit` is that of `t_21` in
-    /// metres. The camera's own pose for the others.
+    /// The pose that the law gets. With a base it is the pose of the base relative to where the base is at the goal; with any other
+    /// mount it is the camera's own. `unit` is the unit of `t_21` in metres.
     #[must_use]
     pub fn pose_for_law(&self, camera: &RelativePose, unit: f64) -> RelativePose {
         let Self::Base(mount) = self else { return *camera };
@@ -91,7 +91,7 @@ impl Axes {
         Ok(Self(axes))
     }
 
-    /// The twist with nothing along and about the other axes.
+    /// The twist without its parts along and about the other axes.
     #[must_use]
     pub fn of(self, twist: &Twist) -> Twist {
         let part = |v: &Vector3<f64>, first: usize| {
@@ -100,7 +100,7 @@ impl Axes {
         Twist { linear: part(&twist.linear, 0), angular: part(&twist.angular, 3) }
     }
 
-    /// What is left of a pose that these axes can mend.
+    /// The part of a pose that motions of these axes bring to zero.
     pub(crate) fn of_pose(self, pose: &RelativePose) -> RelativePose {
         if self.0 == [true; 6] {
             return *pose;
@@ -115,8 +115,8 @@ impl Axes {
 pub struct Rig {
     /// Seconds from one image to the next, for images without stamps.
     pub period: f64,
-    /// About how long the unit of `t_21` is in metres: the harmonic mean of the features' depths at the goal. Exact where metric
-    /// depths are given.
+    /// The unit of `t_21` in metres: the harmonic mean of the features' depths at the goal. It is a guess unless metric depths are
+    /// given.
     pub unit: f64,
     /// What carries the camera.
     pub mount: Mount,

@@ -44,18 +44,18 @@ impl Default for Arrival {
 pub struct Safety {
     /// Speed and turn rate.
     pub limits: Limits,
-    /// How fast the command may change; `None` for at once.
+    /// How fast the command may change; `None` where it may change at once.
     pub acceleration: Option<Acceleration>,
-    /// Turning about the vertical gives way to features at the left and right border of the image.
+    /// The turn about the vertical is changed where it would take features out of the image, at its left and right border.
     pub border: Option<Border>,
-    /// Where the rotation's standard deviation is larger than this, in radians, there is no command.
+    /// A pose is not acted on where the standard deviation of its rotation is larger than this, in radians.
     pub rotation_uncertainty: f64,
-    /// The same of the translation, in the unit of the goal's depths.
+    /// The same for the translation, in the unit of the goal's depths.
     pub translation_uncertainty: f64,
     /// The number of images without a pose for which the last command goes on.
     pub coasting_images: usize,
-    /// An image older than the last one, or one that comes later than this many seconds after it, is stale: infinite for
-    /// never. Without stamps no image is.
+    /// An image that is older than this many seconds is stale, as is one that is not later than the last one; infinite for no
+    /// limit. Without stamps no image is stale.
     pub largest_gap: f64,
     /// How far the camera may be moved to the side where the images show no parallax, as a share of the features' depth; 0 for
     /// never, 0.04 suits most scenes.
@@ -67,8 +67,8 @@ pub struct Safety {
 }
 
 impl Safety {
-    /// These limits and nothing else but a quarter of a radian and of the goal's depths as the largest uncertainty: no limit of
-    /// the acceleration, no border, no coasting, no watchdog, no motion to explore.
+    /// These limits alone: no limit of the acceleration, no border, no coasting, no watchdog, no motion to explore. The largest
+    /// uncertainty is a quarter of a radian, and a quarter of the goal's depths.
     #[must_use]
     pub fn new(limits: Limits) -> Self {
         Self {
@@ -85,8 +85,8 @@ impl Safety {
         }
     }
 
-    /// What suits a real robot: full speed after half a second, one bad image coasts, an image half a second old is stale,
-    /// a loop that does not come nearer holds.
+    /// What suits a real robot. It comes to full speed in half a second. It coasts for one image without a pose. An image that is
+    /// half a second old is stale. The loop holds where it does not come nearer to the goal.
     #[must_use]
     pub fn for_robot(limits: Limits) -> Self {
         let acceleration = Acceleration { linear: 2.0 * limits.speed, angular: 2.0 * limits.turn_rate };
@@ -101,13 +101,13 @@ impl Safety {
 }
 
 impl Border {
-    /// How fast a feature outside of the border is brought back: in 1/s.
+    /// How fast a feature outside of the border is brought back, in 1/s.
     const RETURN_RATE: f64 = 3.0;
     /// The fewest features that are kept.
     const FEWEST: usize = 8;
 
-    /// The image of a camera but for so many pixels at the left and the right; `None` for a camera without a size, or one whose
-    /// image has no viewing rays there.
+    /// The image of a camera without `margin` pixels at the left and the right. `None` for a camera without a size, or one without
+    /// viewing rays at these borders.
     #[must_use]
     pub fn of_camera(camera: &Camera, margin: f64) -> Option<Self> {
         let (width, height) = camera.size()?;
@@ -115,13 +115,13 @@ impl Border {
         Some(Self { left: at(margin)?[0], right: at(f64::from(width) - 1.0 - margin)?[0] })
     }
 
-    /// The turn rate, in rad/s, that is closest to what is wanted and keeps enough features within the border: a feature outside of it
-    /// is brought back at a rate in proportion to its distance. Where a feature is outside at the goal too, its place there
-    /// is its border.
+    /// Of the turn rates that keep enough features within the border, the one closest to what is wanted, in rad/s. A feature
+    /// outside of the border is brought back at a rate in proportion to its distance. Where a feature is outside at the goal too,
+    /// its place there is its border.
     ///
-    /// The border keeps only a quarter of the features, and at least eight. That was measured with features over 50, 70 and 95 % of the
-    /// width, 300 starts each: a border for all features let 14 to 41 % of the starts arrive, one for 60 % of them 67 to 71 %, one for a
-    /// quarter 87 to 96 %. `bounds` is the memory for what each of them asks for, with room for all.
+    /// The border keeps only a quarter of the features, and at least eight. That was measured with features over 50, 70 and 95 % of
+    /// the width, 300 starts each. A border for all features let 14 to 41 % of the starts arrive, one for 60 % of them 67 to 71 %,
+    /// one for a quarter 87 to 96 %. `bounds` is memory for the rates that features ask for, with room for all.
     pub(crate) fn turn(
         &self,
         wanted: f64,

@@ -1,22 +1,25 @@
 //! Whether the motion brings the goal nearer.
 //!
-//! A law lets its potential V fall: `|t|² + |log R|²` in section 10.1. Where V does not fall although motion is commanded the pose is wrong,
-//! or the robot does not do what it is told. On recorded runs that drove away V had not fallen by a tenth over fifteen images of
-//! motion in four of four, in good ones in none of eight. Slow robots need longer than fifteen images, so that the window ends when
-//! the motion that was commanded should have taken a third of what is left.
+//! A law lets its potential V fall: `|t|² + |log R|²` in section 10.1. Where V does not fall although motion is commanded, the pose
+//! is wrong, or the robot does not do what it is told. Recorded runs were judged by whether V fell by a tenth over fifteen images
+//! of motion. It did in none of the four that drove away, and in all eight good ones. A slow robot needs more than fifteen images.
+//! So the window ends once the commanded motion should have covered a third of what is left.
 //!
-//! An estimator learns the length of what is left on the way: with few features the first images say two thirds of it, and V then stays
-//! though the camera comes nearer. What V was is corrected by how much longer the way from where it all began has become.
+//! An estimator learns the length of the remaining way while the camera moves. With few features the first images say two thirds of
+//! it, and V then stays the same though the camera comes nearer. So the first V of a window is scaled by how much longer the way
+//! from the start has become since.
 
 use crate::servo::estimators::estimate::Motion;
 
-/// It judges after this many images at the earliest,
+/// A judgement needs this many images,
 const IMAGES: usize = 15;
-/// and after a commanded way of this share of √V: a right pose then leaves half of V. A unit guessed wrong by five still passes.
+/// and a commanded way of this share of √V. A right pose then leaves half of V, and a unit guessed wrong by a factor of five still
+/// passes.
 const SHARE: f64 = 0.3;
 /// The quotient of the last and the first V above which the loop diverges.
 const FALLEN: f64 = 0.9;
-/// Not judged below this, 6 cm of a metre or 3.5°: there noise decides. With 0.02 it came too late by 14 cm.
+/// Below this V noise decides, and there is no judgement: 6 cm with features at a metre, or 3.5°. With 0.02 the judgement came 14
+/// cm too late.
 const LEAST: f64 = 0.004;
 
 /// A window of images, and what was found.
@@ -32,10 +35,11 @@ pub(crate) struct Watchdog {
 }
 
 impl Watchdog {
-    /// Takes in the law's potential of a pose and the motion commanded before it; whether V has not fallen although it should have.
+    /// Takes in the law's potential V of a pose and the motion commanded before it. Returns whether V has not fallen although it
+    /// should have.
     ///
-    /// `scale` is V of where the camera began, as the estimator sees it now. `variance` is that of the pose's six numbers, added up: within
-    /// three standard deviations of the goal noise decides.
+    /// `scale` is V at the start, as the estimator sees the start now. `variance` is the sum of the variances of the pose's six
+    /// numbers: within three standard deviations of the goal noise decides.
     pub(crate) fn is_diverging(
         &mut self,
         potential: Option<f64>,
@@ -63,7 +67,7 @@ impl Watchdog {
         diverges
     }
 
-    /// Begins a new window: what happened in between is not the law's doing.
+    /// Begins a new window, for what happened in between is not the law's doing.
     pub(crate) fn forget(&mut self) {
         self.first = None;
     }

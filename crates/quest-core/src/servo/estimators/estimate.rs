@@ -14,14 +14,14 @@ pub enum Support {
     RotationOnly,
     /// Rotation and translation, but the camera has not yet been seen to go where it was sent.
     Unconfirmed,
-    /// Several poses that command different things; this is the likeliest.
+    /// Several poses are possible and command different things; this is the likeliest.
     Several,
 }
 
-/// A motion of the camera in its own frame, as it was commanded.
+/// A commanded motion of the camera, in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// The way, in the unit of `t_21`.
+    /// The translation, in the unit of `t_21`.
     pub linear: Vector3<f64>,
     /// The rotation vector, in radians.
     pub angular: Vector3<f64>,
@@ -101,10 +101,11 @@ pub trait PoseEstimator {
     /// The reason to hold.
     fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason>;
 
-    /// How the camera was told to move between the last image and the next one. An estimator may hold its hypotheses against it.
+    /// Tells the estimator how the camera was commanded to move between the last image and the next one. It may compare its
+    /// hypotheses with that.
     fn moved(&mut self, _motion: &Motion) {}
 
-    /// Begins anew, but keeps what it knows of the way since.
+    /// Begins anew, but keeps what it knows of the commanded motion.
     fn restart(&mut self) {}
 
     /// Forgets everything but the goal and the depths that were given.
@@ -117,7 +118,7 @@ pub trait PoseEstimator {
         &[]
     }
 
-    /// Where the camera was when it began, as it is known now; `None` for an estimator that learns nothing on the way.
+    /// The pose of the camera at the start, as the estimator knows it now. `None` for an estimator that learns nothing on the way.
     fn begin(&self) -> Option<RelativePose> {
         None
     }
@@ -127,7 +128,7 @@ pub trait PoseEstimator {
         0
     }
 
-    /// How often it has begun anew.
+    /// How often the estimator has begun anew.
     fn restarts(&self) -> usize {
         0
     }

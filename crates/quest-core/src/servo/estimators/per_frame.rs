@@ -1,7 +1,7 @@
 //! The pose of section 10: one of the candidates of each image, chosen by a rule.
 //!
-//! It is here to be compared with. Under noise the candidates of one image differ more from the truth than they differ from
-//! one another, and near the goal their depths are noise; [`DepthFilter`](crate::servo::DepthFilter) carries on what it knows.
+//! It is here for comparison. Under noise the candidates of one image differ more from the truth than from one another, and near
+//! the goal their depths are noise. [`DepthFilter`](crate::servo::DepthFilter) keeps what it has learnt from earlier images.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,11 +13,11 @@ use crate::{Candidate, Candidates, Correspondence, RelativePose};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Choice {
-    /// That whose depths at the goal, scaled to the same sum, are closest to the reference: section 10.1.
+    /// The candidate whose depths at the goal, scaled to the same sum, are closest to the reference (section 10.1).
     ClosestDepths,
-    /// That whose rotation explains the image best with the reference's depths.
+    /// The candidate whose rotation explains the image best with the reference's depths.
     Reprojection,
-    /// That which leaves the plane of a robot least: section 10.2.
+    /// The candidate that leaves the plane of a robot least (section 10.2).
     RotationAxis,
 }
 

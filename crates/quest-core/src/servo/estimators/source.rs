@@ -5,7 +5,7 @@ use crate::{Candidates, Correspondence};
 
 /// A source of candidate poses: a solver, a robust estimator, another sensor.
 ///
-/// The loop asks it when it has no pose to start from, or has lost it.
+/// The estimator asks it at the start, and when it has lost the pose.
 pub trait PoseSource {
     /// The smallest number of matches it works with.
     fn min_matches(&self) -> usize;

@@ -18,18 +18,18 @@ pub trait ControlLaw {
         Twist { linear: Vector3::zeros(), ..self.command(&turned) }
     }
 
-    /// What the law lets fall as long as the pose is right: its Lyapunov function. `None` where it is not to be judged by one.
+    /// The law's Lyapunov function, which falls as long as the pose is right. `None` where the law is not to be judged by one.
     fn potential(&self, _pose: &RelativePose) -> Option<f64> {
         None
     }
 
-    /// The direction of a small motion that shows parallax: another one in each attempt. To the right, down, to the left.
+    /// The direction of a small motion that shows parallax, another one in each attempt: to the right, down, to the left.
     fn exploration(&self, attempt: usize) -> Twist {
         let direction = [Vector3::x(), Vector3::y(), -Vector3::x()][attempt % 3];
         Twist { linear: direction, angular: Vector3::zeros() }
     }
 
-    /// Whether the border of the image was in the way of the last command: a law that knows another way may take it.
+    /// Tells the law whether the border of the image was in the way of the last command. A law that knows another way may take it.
     fn hindered(&mut self, _is_hindered: bool) {}
 
     /// Forgets what it remembers of earlier images.

@@ -60,8 +60,8 @@ impl World {
         pixels.iter().map(|&p| self.imaging().on_plane(p).unwrap_or([f64::NAN; 2])).collect()
     }
 
-    /// The estimator's options that fit these images: the noise with its rounding, on the plane z = 1, and motions of up to the
-    /// limits at this frame rate, with the features at about `unit` metres.
+    /// The estimator's options for these images. They have the noise on the plane z = 1, rounding included, and the largest motion
+    /// from one image to the next: that of the limits at this frame rate, with the features at about `unit` metres.
     #[must_use]
     pub fn filter_options(&self, limits: &Limits, unit: f64) -> FilterOptions {
         // Exact pixels are given a twentieth of a pixel: a standard deviation of zero has no inverse.
@@ -72,13 +72,13 @@ impl World {
         FilterOptions::for_images(noise, self.goal_images, limits, self.period, unit)
     }
 
-    /// The image but for so many pixels at the left and the right; `None` for a camera without a size.
+    /// The image without `margin` pixels at the left and the right; `None` for a camera without a size.
     #[must_use]
     pub fn border(&self, margin: f64) -> Option<Border> {
         Border::of_camera(&self.camera, margin)
     }
 
-    /// Whether all features are at least `border` pixels inside of the image.
+    /// Whether all features are at least `margin` pixels inside of the image.
     #[must_use]
     pub fn sees_all(&self, pose: &RelativePose, margin: f64) -> bool {
         let imaging = self.imaging();
@@ -91,7 +91,7 @@ impl World {
         self.imaging().project(pose).flatten().count()
     }
 
-    /// Whether a law that is told the true pose, with `unit` metres for one, keeps all features in view for `images` images.
+    /// Whether a law keeps all features in view for `images` images. It gets the true pose, in the unit of `unit` metres.
     #[must_use]
     pub fn stays_in_view(
         &self,

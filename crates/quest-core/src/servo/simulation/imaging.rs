@@ -15,7 +15,7 @@ pub struct Disturbances {
     pub noise_px: f64,
     /// Whether pixels are rounded to whole numbers, after the noise.
     pub rounded: bool,
-    /// The share of features that are somewhere else in the image.
+    /// The share of outliers: features that are found at a random place of the image.
     pub outliers: f64,
     /// Wrong matches that stay: how many and for how long. Descriptors make the same mistakes while a camera stands still.
     pub sticky: Option<Sticky>,
@@ -23,7 +23,7 @@ pub struct Disturbances {
     pub wrong_images: f64,
     /// Delay of the images that the controller gets, in images.
     pub delay: usize,
-    /// From the first image of this range to before the last one, only so many features are found.
+    /// In the images of this range only so many features are found.
     pub lost: Option<(std::ops::Range<usize>, usize)>,
 }
 
@@ -32,7 +32,7 @@ pub struct Disturbances {
 pub struct Sticky {
     /// The share of features that are matched with another one.
     pub share: f64,
-    /// Its mean duration in images; infinite for ever.
+    /// The mean duration of a wrong match, in images; infinite where it stays for ever.
     pub images: f64,
 }
 

@@ -39,12 +39,12 @@ const SCHEDULE: Schedule = Schedule {
     singular: Singular::IsDamped,
 };
 
-/// How a robot is kept on the plane x–z: deviations from it, one standard deviation.
+/// How exactly a robot keeps to the plane x–z: the standard deviations of tilt and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// The deviation of the tilt, in radians.
+    /// That of the tilt, in radians.
     pub tilt: f64,
-    /// The deviation of the height, in the unit of t.
+    /// That of the height, in the unit of `t`.
     pub height: f64,
 }
 

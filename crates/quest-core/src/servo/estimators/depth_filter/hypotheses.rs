@@ -6,14 +6,14 @@ use crate::servo::estimators::depth_filter::reference::DepthReference;
 use crate::servo::estimators::depth_filter::setting::{Image, Setting};
 use crate::servo::estimators::estimate::HoldReason;
 
-/// How many answers to the first image are kept apart. Every one is fitted to every image, so that this bounds an image's time.
+/// How many answers to the first image are kept apart. Every one is fitted to every image, so this number bounds an image's time.
 pub(super) const MAX_HYPOTHESES: usize = 8;
 /// A hypothesis with so much more χ² than the best is dropped: odds of 1 to 3e6.
 const HOPELESS: f64 = 30.0;
 /// No single image counts for more than this: the odds of 1 to 300,000 that a false one may cost the truth.
 const MOST_OF_ONE_IMAGE: f64 = 25.0;
-/// Steps of a fit that is only to be compared: of the rivals of the best hypothesis, and with a feature left out. The last pose is one
-/// image's motion away; two or three steps lead from there to the minimum where depths and features are right.
+/// Steps of a fit that serves only for comparison: a fit of a rival of the best hypothesis, or one with a feature left out. The
+/// last pose is one image's motion away. Where depths and features are right, two or three steps lead from there to the minimum.
 const FEW_STEPS: usize = 5;
 /// Answers closer than this in rotation (radians) and in translation (units of length) are the same.
 const SAME: f64 = 1e-3;

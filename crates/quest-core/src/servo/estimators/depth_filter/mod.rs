@@ -1,14 +1,15 @@
 //! The estimator of the loop: candidates start it, a filter on the goal's inverse depths carries it on.
 //!
 //! 1. *Average.* The first images are averaged (`first_images.rs`).
-//! 2. *Search.* Their mean has candidates (`source`), each with its inverse goal depths: the hypotheses. They are fitted over the
-//!    next images, a few in each, so that no image takes long (`search.rs`).
-//! 3. *Follow.* Every further image is fitted by every hypothesis (`fit.rs`, `hypotheses.rs`). The depths of a wrong one do not fit
-//!    images from elsewhere: its costs add up, and it is dropped. The one with the smallest sum gives the pose. Its cost has to be
-//!    what noise explains; where it is more, features are left out one at a time.
-//! 4. *Gate.* The camera can have come to the pose since the last one. After several images without a pose the candidates are
-//!    asked again, with the old depths first.
-//! 5. *Learn.* An accepted image adds to the depths, with a small weight: the noise of the goal image is in all of them.
+//! 2. *Search.* The source gives candidates for their mean. A candidate with its inverse depths at the goal is a hypothesis. The
+//!    hypotheses are fitted over the next images, a few in each, so that no image takes long (`search.rs`).
+//! 3. *Follow.* Every further image is fitted by every hypothesis (`fit.rs`, `hypotheses.rs`). The depths of a wrong hypothesis do
+//!    not fit images from elsewhere: its costs add up, and it is dropped. The hypothesis with the smallest sum gives the pose.
+//!    Noise has to explain its cost; where the cost is more, features are left out one at a time.
+//! 4. *Gate.* A pose counts if the camera can have come there since the last one. After several images without a pose the source
+//!    gives candidates again, which are first tried with the old depths.
+//! 5. *Learn.* An accepted image adds to what is known of the depths. Its weight is small, for all images share the noise of the
+//!    goal image.
 //!
 //! Choosing anew in every frame, as section 10.1 does, is in [`PerFrame`](crate::servo::PerFrame).
 
@@ -45,7 +46,7 @@ pub struct DepthFilter<S> {
     image: Image,
     /// Which features agreed with the last pose.
     inliers: Vec<bool>,
-    /// Images since the last accepted pose, but for those that a search takes.
+    /// Images since the last accepted pose, without those that a search takes.
     missed: usize,
     /// Whether there has been a pose.
     has_started: bool,
@@ -97,7 +98,7 @@ impl<S: PoseSource> DepthFilter<S> {
         }
     }
 
-    /// How exactly the goal's depths are known, relative to each: one standard deviation.
+    /// The relative standard deviation of each of the goal's depths.
     pub fn depth_precisions(&self) -> impl Iterator<Item = f64> {
         self.hypotheses.best().into_iter().flat_map(|best| best.reference.precisions())
     }
@@ -174,7 +175,8 @@ impl<S: PoseSource> DepthFilter<S> {
         Ok(self.told(&fitted, &covariance))
     }
 
-    /// Whether the image is for a search: it runs, there is no hypothesis, or there was no pose for as long as patience lasts.
+    /// Whether the image is for a search: one is running, there is no hypothesis, or there was no pose for as many images as
+    /// `patience` says.
     fn has_to_search(&self) -> bool {
         let patience = self.setting.options.patience;
         let is_lost = self.missed > 0 && self.missed % (patience + 1) == patience;
@@ -199,7 +201,7 @@ impl<S: PoseSource> DepthFilter<S> {
         Ok(())
     }
 
-    /// The covariance of a pose to which the camera can have come from the last one.
+    /// The covariance of a pose, if the camera can have come there from the last one.
     fn gate(&mut self, fitted: &Fitted) -> Result<Matrix6<f64>, HoldReason> {
         let covariance = self.hypotheses.covariance().ok_or(HoldReason::Inconsistent)?;
         let is_reachable = |from: &RelativePose| {
@@ -220,7 +222,7 @@ impl<S: PoseSource> DepthFilter<S> {
         Ok(covariance)
     }
 
-    /// What is told of an accepted image.
+    /// The estimate of an accepted image.
     fn told(&self, fitted: &Fitted, covariance: &Matrix6<f64>) -> Estimate {
         let inliers = self.image.seen();
         Estimate {

@@ -9,12 +9,12 @@ use crate::servo::twist::Limits;
 pub struct FilterOptions {
     /// Standard deviation of the coordinates in the current image on the plane z = 1: pixels divided by the focal length.
     pub noise: f64,
-    /// The same of the goal image: smaller by √k where k goal images are averaged.
+    /// The same for the goal image. It is smaller by √k where k goal images are averaged.
     pub goal_noise: f64,
-    /// Fewer features than this are not acted on.
+    /// With fewer features than this there is no pose.
     pub min_features: usize,
-    /// How much the inverse depths of the features at the goal differ from their mean, before anything is known of them:
-    /// one standard deviation, as a share of the mean.
+    /// The standard deviation of the features' inverse depths at the goal, as a share of their mean, before anything is known of
+    /// them.
     pub spread: f64,
     /// The weight of one image in the goal's depths.
     pub frame_weight: f64,
@@ -24,22 +24,24 @@ pub struct FilterOptions {
     pub largest_turn: f64,
     /// The largest change of t from one image to the next, in the unit of the goal's depths.
     pub largest_move: f64,
-    /// The number of images that are averaged before the camera is told to move. The depths of the first pair decide the way, and the
-    /// noise of these images can still be averaged away.
+    /// The number of images that are averaged before the camera is told to move. The depths from their mean decide the first way,
+    /// and only while the camera stands still can noise be averaged away.
     pub first_images: usize,
-    /// The number of images without a pose after which the candidates are asked again. That takes several images too.
+    /// After so many images without a pose the source is asked for candidates again. The search takes several more images.
     pub patience: usize,
-    /// For a robot that moves on a plane with a level camera: how exactly.
+    /// How exactly a robot with a level camera keeps to its plane; `None` for a free camera.
     pub plane: Option<Plane>,
-    /// Where the camera is on the robot whose plane that is: takes points of the camera's frame to the base's, with the translation
-    /// in the unit of the goal's depths. The identity for a level camera above the axle.
+    /// Where the camera is on that robot. The pose takes points of the camera's frame to the base's; its translation is in the unit
+    /// of the goal's depths. It is the identity for a level camera above the axle.
     pub base: RelativePose,
 }
 
 impl FilterOptions {
-    /// What follows from the images and the limits: `noise` is the standard deviation of a coordinate on the plane z = 1, the goal's
-    /// features are the mean of `goal_images`, `period` is the time from image to image in seconds, the features are at about `unit` metres.
-    /// The camera may move half as fast again as it is told.
+    /// The options that follow from the images and the limits.
+    ///
+    /// `noise` is the standard deviation of a coordinate on the plane z = 1. The goal's features are the mean of `goal_images`
+    /// images. `period` is the time from one image to the next, in seconds. The features are at about `unit` metres. The camera may
+    /// move half as fast again as it is commanded.
     #[must_use]
     pub fn for_images(noise: f64, goal_images: usize, limits: &Limits, period: f64, unit: f64) -> Self {
         Self {

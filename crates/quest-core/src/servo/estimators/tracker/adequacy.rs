@@ -1,9 +1,10 @@
 //! Whether the depths are known well enough to translate.
 //!
-//! Near the goal the loop is `ξ' = −λ Ĵ⁺ J ξ` with Ĵ from the depths that the map says. Where depths are wrong the goal is an unstable
-//! point: with all depths equal, in 85 to 91 % of general scenes, with reversed ones in all, with half of the relief in less than 1 %.
-//! What their errors do to a translation of any length is `E = J_t⁺ diag(δρ) J_t`, less the part that is a common scale, which only
-//! changes the speed. The adequacy is the standard deviation of `|E|`: below 0.4 the loop is stable by two and a half of them.
+//! Near the goal the loop is `ξ' = −λ Ĵ⁺ J ξ`, with Ĵ from the map's depths. Wrong depths can make the goal an unstable point. They
+//! do in 85 to 91 % of general scenes where all depths are taken to be equal, in all scenes where they are reversed, and in less
+//! than 1 % where they have half of the relief. By errors `δρ` of the inverse depths, a translation of any length changes by
+//! `E = J_t⁺ diag(δρ) J_t`. A common scale is taken out of it, for that only changes the speed. The adequacy is the standard
+//! deviation of `|E|`. Below 0.4 the loop is stable by two and a half standard deviations.
 
 use nalgebra::Matrix6;
 

@@ -1,7 +1,7 @@
 //! Poses that many of the matches of one image agree on.
 //!
-//! A camera that stands still makes the same wrong matches in all of its images: their mean keeps them. Samples of five are solved, and each
-//! candidate is scored by all matches with a bounded loss; a wrong match then costs its share and no more.
+//! A camera that stands still makes the same wrong matches in all of its images, and their mean keeps them. So samples of five are
+//! solved, and each candidate is scored by all matches with a bounded loss: a wrong match costs its share and no more.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +12,8 @@ use crate::{Candidates, Correspondence, RelativePose};
 
 /// Below so many features all candidates are tried, not those of the consensus alone.
 pub(crate) const FEW: usize = 25;
-/// So many different poses are kept of few matches, where poses that explain six of twelve by chance are common, and of many.
+/// So many different poses are kept: the first number of few matches, of which many poses explain six of twelve by chance, the
+/// second of many.
 pub(crate) const KEPT: usize = 12;
 const KEPT_OF_MANY: usize = 4;
 /// Samples at least, and at most: with six right matches of twelve one sample of 132 is right, so that 1,024 miss in one of 2,000 starts.
@@ -147,7 +148,7 @@ impl Consensus {
         &self.candidates
     }
 
-    /// How many samples it takes until one of right matches alone is among them, by the matches that the best pose explains.
+    /// How many samples it takes until one of them has right matches alone, if those are the matches that the best pose explains.
     pub(crate) fn wanted(&self, size: usize) -> usize {
         let n = self.matches.len();
         let subsets = (0..size.min(n)).fold(1, |count, i| count * (n - i) / (i + 1));

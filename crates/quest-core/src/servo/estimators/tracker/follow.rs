@@ -71,7 +71,7 @@ impl<S: PoseSource> Tracker<S> {
         self.worse = if mean > WORSE * self.best_mean { self.worse + 1 } else { 0 };
     }
 
-    /// Fits the image on one map, from where the camera was or was sent, whichever explains it better.
+    /// Fits the image on one map. The fit begins where the camera was or where it was sent, whichever explains the image better.
     fn fit(&mut self, k: usize, task: &Task) {
         let h = &mut self.hypotheses[k];
         let mapped = h.map.points.iter().zip(&self.frame).filter(|(p, f)| p.is_mapped && f.is_some()).count();
@@ -226,8 +226,8 @@ impl<S: PoseSource> Tracker<S> {
         })
     }
 
-    /// Whether the hypotheses of a start beside the goal differ by half of the way, or do not all know the depths: which of them is
-    /// followed decides there whether the camera comes nearer.
+    /// Whether the hypotheses of a start beside the goal differ by half of the way, or do not all know the depths. There the choice
+    /// of a hypothesis decides whether the camera comes nearer.
     fn is_unsure_beside_goal(&self) -> bool {
         if self.has_been_far || self.options.plane.is_some() || self.goal.len() < VERY_FEW {
             return false;
@@ -258,7 +258,7 @@ impl<S: PoseSource> Tracker<S> {
     }
 }
 
-/// Sends hypotheses to the end that have become one with a better one.
+/// Sends to the end every hypothesis that has become the same as a better one.
 fn drop_twice(alive: &mut [Hypothesis]) {
     let mut count = alive.len();
     let mut k = 1;

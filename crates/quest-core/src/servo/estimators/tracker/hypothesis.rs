@@ -71,7 +71,7 @@ impl Hypothesis {
     }
 }
 
-/// Where a hypothesis says the camera has been, beside where it was sent.
+/// The way of the camera as a hypothesis sees it, beside the commanded way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Track {
     entries: [Entry; Track::LENGTH],
@@ -116,18 +116,18 @@ impl Track {
     const LENGTH: usize = 9;
     /// An entry is added after so much motion, so that slow cameras and fast images do not shorten the window to nothing.
     const STEP: f64 = 2e-3;
-    /// A way is judged after so many images at the earliest, three of them delayed,
+    /// A way is judged after so many images, of which three may be delayed,
     const IMAGES: usize = 6;
-    /// and once it is longer than this and so many standard deviations of a pose,
+    /// and once it is longer than the sum of this and so many standard deviations of a pose.
     const WAY: f64 = 4e-3;
     const DEVIATIONS: f64 = 5.0;
-    /// but whether the camera went the other way at this length, whatever they are.
+    /// At this length it is judged whether the camera went the other way, whatever the standard deviations are.
     const LONG_WAY: f64 = 0.1;
-    /// Further from the start than this an unconfirmed pose does not take the camera.
+    /// An unconfirmed pose takes the camera no further from the start than this.
     const UNCONFIRMED: f64 = 0.2;
     /// The weight of an image in the scatter of the poses.
     const WEIGHT: f64 = 0.1;
-    /// The motion seen is within 60° of the one commanded where it confirms it.
+    /// A pose is confirmed where the motion seen is within 60° of the commanded one: its cosine.
     const CONFIRMS: f64 = 0.5;
 
     pub(crate) fn clear(&mut self) {
@@ -191,9 +191,9 @@ impl Track {
         (0.5 * self.scatter).sqrt()
     }
 
-    /// Judges the way since the last judgement once it is long enough to say something: whether it contradicts the commands.
+    /// Judges the way since the last judgement, once it is long enough: whether it contradicts the commands.
     ///
-    /// The sign alone counts, the unit is a guess: the camera of the reversed scene goes the other way.
+    /// The sign alone counts, for the unit is a guess. By the reversed scene the camera goes the other way.
     fn judge_way(&mut self, now: &Entry, deviation: f64) -> bool {
         let begin = *self.begin.get_or_insert(*now);
         let first = *self.anchor.get_or_insert(*now);

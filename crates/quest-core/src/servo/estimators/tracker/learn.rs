@@ -5,12 +5,13 @@ use crate::servo::estimators::tracker::map::PLANE_RELIEF;
 use crate::servo::estimators::tracker::resection::{INLIER, KNEE, Task, bounded, residuals};
 use crate::servo::estimators::tracker::{Phase, Tracker};
 
-/// A key image is this far from all others and from the goal, in the unit of the depths: none near the goal, so that what was learnt
-/// cannot walk away there.
+/// A key image is this far from all others and from the goal, in the unit of the depths. Near the goal there are none, so that the
+/// map cannot drift there.
 const KEY_DISTANCE: f64 = 0.04;
 /// Steps after a new key image at most.
 const STEPS: usize = 8;
-/// With more features than this an image works on one map alone, by a step or a judgement: with a thousand each takes about a millisecond.
+/// With more features than this an image gives time to one map alone, for a step or a judgement. With a thousand features each of
+/// these takes about a millisecond.
 const MANY: usize = 100;
 /// A depth known so well counts in the question whether the scene is a plane.
 const WELL_KNOWN: f64 = 0.01;
@@ -41,7 +42,7 @@ impl<S: PoseSource> Tracker<S> {
         }
     }
 
-    /// One step of a map, or the question how good it is: with few features both in the image of the last step.
+    /// One step of a map, or its judgement. With few features the last step and the judgement share an image.
     fn adjust(&mut self, k: usize, task: &Task) {
         let survey = Self::survey(&self.goal, &self.known, &self.keys[..self.key_count], task);
         let map = &mut self.hypotheses[k].map;

@@ -26,7 +26,7 @@ pub(crate) struct Map {
     pub(crate) points: Vec<Point>,
     /// The plane `ρ = n · (u, v, 1)` about which the inverse depths scatter.
     pub(crate) normal: Vector3<f64>,
-    /// By so much.
+    /// The standard deviation of the inverse depths about the plane.
     pub(crate) relief: f64,
     /// One for each key image.
     pub(crate) keys: Vec<RelativePose>,

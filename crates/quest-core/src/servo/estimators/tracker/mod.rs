@@ -1,18 +1,20 @@
 //! The estimator of the loop: the pose of each image on a map of the goal's features, whose depths are learnt.
 //!
-//! An image is worked on by these steps, of which [`estimate`](PoseEstimator::estimate) reads:
+//! These are the steps for an image, as [`estimate`](PoseEstimator::estimate) takes them:
 //!
 //! 1. **Average** the first images; **search** hypotheses among their matches (`start/`): rotations, planes and scenes with relief.
-//! 2. **Follow**: each hypothesis alive finds the pose of the image on its map (`resection.rs`). The costs add up, with what the
-//!    commanded motion says (`hypothesis.rs`); hopeless hypotheses are dropped, and one that sees the camera go another way than it was
-//!    sent. Until the camera has been seen to go where it is sent the pose is [`Unconfirmed`](crate::servo::Support::Unconfirmed).
-//! 3. **Gate**: enough features agree, and the camera can have come there since the last image.
+//! 2. **Follow**: each hypothesis that is alive finds the pose of the image on its map (`resection.rs`). Its costs add up, with
+//!    what the commanded motion says (`hypothesis.rs`). A hopeless hypothesis is dropped, and so is one that sees the camera go
+//!    another way than it was sent. The pose is [`Unconfirmed`](crate::servo::Support::Unconfirmed) until the camera has been seen
+//!    to go where it is sent.
+//! 3. **Gate**: a pose counts if enough features agree with it, and if the camera can have come there since the last image.
 //! 4. **Learn**: an image from somewhere new becomes a key image, and the map is adjusted by one damped step an image until it
 //!    settles (`adjust/`).
-//! 5. **Judge**: where the depths are not known well enough for a translation to point the right way only the rotation counts
+//! 5. **Judge**: only the rotation counts where the depths are not known well enough for a translation to point the right way
 //!    (`adequacy.rs`).
 //!
-//! Every step costs as much as there are features, N, times a constant; the map's steps, which are few, a hundred times that.
+//! Every step takes a time in proportion to the number of features. The steps of the map take a hundred times as long as the
+//! others, and are few.
 
 mod adequacy;
 mod adjust;
@@ -47,8 +49,8 @@ const KEYS_OF_FEW: usize = 6;
 const KEYS_OF_MANY: usize = 3;
 /// The start's rotation is left where its cost has risen by so much, and more than chance: see [`Tracker::leave_rotation`].
 const RISEN: f64 = 10.0;
-/// The adequacy below which a translation is commanded; up to three times as much where the goal is further than
-/// [`FAR`](Self), for there is time to learn.
+/// A translation is commanded where the adequacy is below this. It may be up to three times as much where the goal is further than
+/// `FAR`, for there is time to learn.
 const ADEQUATE: f64 = 0.4;
 const FAR: f64 = 0.06;
 /// Fewer features than this never determine the depths well from one side.
@@ -69,7 +71,7 @@ fn most_inadequate(h: &Hypothesis) -> f64 {
     ADEQUATE * (way / FAR).clamp(1.0, 3.0)
 }
 
-/// What the estimator is in.
+/// What the estimator is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// Looking for hypotheses.
@@ -110,14 +112,15 @@ pub struct Tracker<S> {
     missed: usize,
     /// The least cost a feature of a rotation so far; NaN before the first.
     rotation_level: f64,
-    /// Images in a row: rotations that do not explain, maps that are not adequate, lone hypotheses that contradict the commands.
+    /// Three counts of images in a row: those that a rotation did not explain, those without an adequate map, those whose lone
+    /// hypothesis contradicts the commands.
     unexplained: usize,
     dull: usize,
     contradicted: usize,
     /// The least mean squared residual of the inliers so far, and for how many images it has been far above.
     best_mean: f64,
     worse: usize,
-    /// Whether the camera has been further from the goal than next to it since the start.
+    /// Whether the camera has been further from the goal than `NEXT_TO_GOAL` since the start.
     has_been_far: bool,
     /// Whether the last estimate was of the rotation alone.
     is_turning_only: bool,
@@ -202,7 +205,7 @@ impl<S: PoseSource> Tracker<S> {
         self.points().map(|point| point.map_or(f64::NAN, |p| 1.0 / p.rho.max(0.0)))
     }
 
-    /// How exactly they are known, relative to each: one standard deviation, NaN where nothing is known.
+    /// The relative standard deviation of each depth; NaN where nothing is known.
     pub fn depth_precisions(&self) -> impl Iterator<Item = f64> {
         self.points().map(|point| point.map_or(f64::NAN, |p| p.variance.sqrt() / p.rho.abs().max(1e-3)))
     }
@@ -307,11 +310,11 @@ impl<S: PoseSource> Tracker<S> {
 
     /// Whether the first images are explained by a rotation, or by nothing that a translation could rest on.
     fn prefers_rotation(&self, rotation: &resection::Fit, pool: &[Hypothesis]) -> bool {
-        /// Answers so close in score to the best are as good as it.
+        /// An answer whose score is this close to the best one's is as good as the best.
         const NEAR: f64 = 8.0;
-        /// Next to the goal those count that are not hopeless.
+        /// Next to the goal every answer counts that is not hopeless.
         const POSSIBLE: f64 = 15.0;
-        /// And here nothing but evidence will do: the goal is an unstable point of the loop with wrong depths.
+        /// Where the goal would be an unstable point of the loop with wrong depths, only strong evidence will do.
         const CAREFUL: f64 = 30.0;
         const CAREFUL_ADEQUACY: f64 = 0.3;
         let n = rotation.seen as f64;

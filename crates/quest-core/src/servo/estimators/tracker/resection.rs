@@ -6,10 +6,10 @@
 //! e = π(R m + ρ t) − z        C = σ² I + P a aᵀ + Q G Gᵀ        a = ∂π/∂ρ ∥ D t,   G = ∂π/∂(u, v)
 //! ```
 //!
-//! by reweighted Gauss–Newton steps in which `C` is held fixed: its derivative by t is not taken. A joint fit of pose and free depths is
-//! inconsistent (Neyman and Scott 1948): each free depth fits one residual, the better the longer t is. With 180 features and
-//! t = 0 it finds |t| = 0.04 and a rotation that is off by 2°; this quasi-score finds 0.006 and 0.3°. A feature of unknown depth has a large
-//! P: it counts across its epipolar line alone.
+//! by reweighted Gauss–Newton steps in which `C` is held fixed: its derivative by t is not taken. A joint fit of pose and free
+//! depths is inconsistent (Neyman and Scott 1948), for each free depth fits one residual, the better the longer t is. With 180
+//! features and t = 0 the joint fit finds |t| = 0.04 and a rotation that is off by 2°; these steps find 0.006 and 0.3°. A feature
+//! of unknown depth has a large P, so that it counts across its epipolar line alone.
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 

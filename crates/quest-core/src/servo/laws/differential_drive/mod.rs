@@ -34,15 +34,15 @@
 //! Near the goal (`r` below a limit) it stops and turns: `ν = 0`, `ω = −k2 sin θ`, (C.6), (C.7); `1 − cos θ` decreases.
 //!
 //! # Beside the paper
-//! - **Stopping.** Near the goal `φ` is made of noise. The robot stops where `r` is small, also where what is left lies
-//!   sideways (`r |cos φ|` small), which driving cannot mend, and stays stopped until `r` is clearly larger. Both are those of
-//!   the running mean of `t` over some images: the smallest `r` of many noisy ones comes long before the goal does.
+//! - **Stopping.** Near the goal `φ` is made of noise. The robot stops where `r` is small. It also stops where the goal lies
+//!   sideways (`r |cos φ|` small), which driving cannot mend. It stays stopped until `r` is clearly larger. `r` and `φ` are those
+//!   of the running mean of `t` over some images, for the smallest `r` of many noisy ones comes long before the goal does.
 //! - **Turning fades** with `r² / (r² + f²)` for the same reason.
 //! - **Hysteresis.** `s` changes only beyond `|cos φ| > 0.1`.
 //! - **Backing off.** A robot beside its goal has to turn away from the features to get there. Where the border of the image does
-//!   not let it turn the robot drives back, leaning to the side on which that takes it behind the goal, until the direction
-//!   `α = φ + θ` from it to the goal is so close to the goal's heading that it can drive there with the features in view. From x
-//!   beside the goal, with the lean β, the way back and forth is about `x / tan β`.
+//!   not let it turn, the robot drives back, leaning to the side that takes it behind the goal. It stops backing once the direction
+//!   `α = φ + θ` from it to the goal is close to the goal's heading: from there it can drive to the goal with the features in view.
+//!   From x beside the goal, with the lean β, it drives back by about `x / tan β`.
 
 use crate::RelativePose;
 use crate::servo::{ControlLaw, Twist};
@@ -59,7 +59,7 @@ const IN_LINE: f64 = 0.07;
 /// How far it leans to the side meanwhile, in radians, and its speed as a share of the gain.
 const LEAN: f64 = 0.35;
 const BACKING_SPEED: f64 = 0.4;
-/// So often at most: each time takes it closer to the line behind the goal.
+/// It backs off so often at most. Each time takes it closer to the line behind the goal.
 const MOST_BACKINGS: usize = 6;
 
 /// The distance, bearing and heading of a robot that moves on a plane, from its pose relative to the goal.
@@ -74,7 +74,7 @@ pub struct PlanarPose {
 }
 
 impl PlanarPose {
-    /// The part of a pose on the plane x–z; what is not on it is left out.
+    /// The part of a pose on the plane x–z. The height and the tilt are left out.
     #[must_use]
     pub fn new(pose: &RelativePose) -> Self {
         let (r, t) = (pose.r_21(), &pose.t_21);
@@ -109,7 +109,7 @@ pub struct DifferentialDriveLaw {
     pub start_distance: f64,
     /// Turning towards the goal fades out at this distance.
     pub fade_distance: f64,
-    /// The number of images over whose mean the robot is judged close enough to stop; 1 for the last image alone.
+    /// The number of images whose mean decides whether the robot is close enough to stop; 1 for the last image alone.
     pub averaged_images: f64,
     /// The robot backs off no further from the goal than this; 0 for never.
     pub furthest_back: f64,
@@ -154,7 +154,7 @@ impl DifferentialDriveLaw {
         }
     }
 
-    /// The law as published, but for the signs: it stops driving below `stop_distance` and has no other precautions.
+    /// The law as published, with its signs corrected. It stops driving below `stop_distance` and takes no other precautions.
     #[must_use]
     pub fn as_published(speed_gain: f64, turn_gain: f64, stop_distance: f64) -> Self {
         Self {
@@ -174,7 +174,7 @@ impl DifferentialDriveLaw {
         self.phase == Phase::Turning
     }
 
-    /// Whether there is nothing left to drive, by the running mean with this `(tx, tz)` in it.
+    /// Whether the robot is at the goal by the running mean of `(tx, tz)`, into which this one is taken.
     fn is_at_goal(&mut self, t: [f64; 2]) -> bool {
         let before = self.mean.unwrap_or(t);
         let [x, z] = [0, 1].map(|k| before[k] + (t[k] - before[k]) / self.averaged_images.max(1.0));
