@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Rooms from the first to the last: none imports one that stands after it in its line.
-const ORDERS: [&[&str]; 5] = [
+const ORDERS: [&[&str]; 6] = [
     &["algebra", "pose", "solver", "lanes", "robust", "servo"],
     &["robust::data", "robust::refine", "robust::search", "robust::conclude"],
     &["solver::shared", "solver::published", "solver::many_matches", "solver::quaternions"],
     &["solver::quest::cubics", "solver::quest::five_matches", "solver::many_matches", "solver::quest"],
+    &["servo::laws", "servo::estimators", "servo::controller", "servo::simulation"],
     &["camera", "pose", "correspondence", "structure", "feasibility", "solver"],
 ];
 

@@ -205,6 +205,15 @@ laws!(any homography: Subject {
     ..Subject::new(SolverName::Homography)
 });
 
+#[test]
+fn every_solver_has_its_laws() {
+    let without = SolverName::named().filter(|solver| {
+        let subject = format!("Subject::new(SolverName::{solver:?})");
+        !include_str!("main.rs").contains(&subject)
+    });
+    assert_eq!(without.collect::<Vec<_>>(), [], "expected a line `laws!(…)` for each in this file");
+}
+
 const SEED_LITERAL: u64 = 100;
 const SEED_PLANTED: u64 = 101;
 const SEED_SYMMETRIES: u64 = 102;
