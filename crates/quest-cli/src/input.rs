@@ -12,7 +12,7 @@ use quest_io::{Fault, Pair, Pairs, ReadError};
 use crate::{
     Failure,
     options::{OutputOptions, input_format_parser, parse_camera},
-    sources::{Sources, sources},
+    sources::{Sources, extensions, sources},
     words,
 };
 
@@ -40,7 +40,7 @@ pub(crate) struct ReadingOptions {
 /// Where one pair comes from.
 #[derive(Args, Debug)]
 pub(crate) struct InputOptions {
-    /// The file of matches: .json, .jsonl, .csv, .npy, .npz or .parquet; `-` is standard input.
+    #[arg(help = format!("The file of matches, {}; `-` is standard input", extensions()))]
     file: PathBuf,
     #[command(flatten)]
     reading: ReadingOptions,
@@ -49,9 +49,10 @@ pub(crate) struct InputOptions {
 /// Where pairs come from.
 #[derive(Args, Debug)]
 pub(crate) struct InputsOptions {
-    /// The files of matches, .json, .jsonl, .csv, .npy, .npz or .parquet, folders of them, or patterns such as 'pairs/*.npz'; `-` is
-    /// standard input.
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, help = format!(
+        "The files of matches, {}, folders of them, or patterns such as 'pairs/*.npz'; `-` is standard input",
+        extensions()
+    ))]
     files: Vec<PathBuf>,
     #[command(flatten)]
     reading: ReadingOptions,

@@ -52,6 +52,14 @@ fn is_pattern(argument: &Path) -> bool {
     argument.to_string_lossy().contains(['*', '?', '[']) && !argument.exists()
 }
 
+/// The extensions of the files that this build reads.
+pub(crate) fn extensions() -> String {
+    let built = Format::ALL.into_iter().filter(|format| format.is_built());
+    let extensions =
+        built.flat_map(|format| format.info().extensions).map(|extension| format!(".{extension}"));
+    extensions.collect::<Vec<_>>().join(", ")
+}
+
 /// The files of a folder whose extension is known, by their names.
 fn of_folder(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let fail = |fault: String| Failure::Arguments(format!("{}: {fault}", folder.display()));
@@ -63,10 +71,8 @@ fn of_folder(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut files: Vec<_> = paths.into_iter().filter(is_known).collect();
     files.sort();
     if files.is_empty() {
-        let built = Format::ALL.into_iter().filter(|format| format.is_built());
-        let extensions =
-            built.flat_map(|format| format.info().extensions).copied().collect::<Vec<_>>().join(", .");
-        return Err(fail(format!("found a folder without files of matches, expected one of .{extensions}")));
+        let extensions = extensions();
+        return Err(fail(format!("found a folder without files of matches, expected one of {extensions}")));
     }
     Ok(files)
 }

@@ -99,7 +99,7 @@ impl Format {
         matches!(self, Self::JsonLines | Self::Parquet)
     }
 
-    /// The form that the extension of `path` stands for: `.json`, `.jsonl` or `.ndjson`, `.csv`, `.npy` or `.npz`, `.parquet`.
+    /// The form that the extension of `path` stands for.
     #[must_use]
     pub fn from_extension(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -263,8 +263,8 @@ impl Pairs {
                 let bytes = self.bytes()?;
                 json_file::parse(&self.place, text(&self.place, &bytes)?)
             }
-            Format::Csv | Format::Npy => Ok(self.rows(&MATCHES)?.pair(&self.place)),
             Format::Parquet => Err(self.place.clone().error(Fault::NoParquet)),
+            _ => Ok(self.rows(&MATCHES)?.pair(&self.place)),
         }
     }
 
