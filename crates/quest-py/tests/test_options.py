@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -51,6 +51,13 @@ def test_what_is_no_option_is_refused_with_the_list_of_those_that_are(name: str)
 def test_every_search_checks_every_option(name: str, options: dict[str, Any], error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         SEARCHES[name](**options)
+
+
+def test_the_type_of_the_loss_has_every_loss() -> None:
+    with pytest.raises(qp.QuestError) as refused:
+        SEARCHES["estimate"](loss="huber")
+    listed = str(refused.value).split("expected one of ")[1].split(", ")
+    assert set(listed) == set(get_args(qp.EstimateOptions.__annotations__["loss"]))
 
 
 @pytest.mark.parametrize("name", ["estimate", "estimate_batch", "third_view"])
