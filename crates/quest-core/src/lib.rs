@@ -19,8 +19,7 @@
 //!     .map(|&(x1, x2)| Correspondence::from_pixels(&camera, x1, &camera, x2))
 //!     .collect::<Result<_, _>>()?;
 //!
-//! let focal_lengths = [[1060.0; 2]; 2];
-//! let found = robust::estimate(&matches, &Options { threshold: 1.5, focal_lengths, ..Options::default() })?;
+//! let found = robust::estimate(&matches, &Options::in_pixels(1.5, &camera, &camera))?;
 //! println!("{} pose {:?}, {} inliers", found.model.name(), found.pose, found.inlier_count);
 //! # assert!(found.pose.rotation_error(&scene.truth) < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -21,7 +21,8 @@ pub struct Options {
     /// `fx, fy` of view 1 and of view 2, in pixels. With all of them 1 the threshold is in units of the plane `z = 1`, or
     /// in radians for bearings.
     pub focal_lengths: [[f64; 2]; 2],
-    /// How the search scores a residual: `Marginalised` over all thresholds up to one, or `Truncated` at one (MSAC).
+    /// How the search scores a residual: `Marginalised` over all thresholds up to one, or `Truncated` at one (MSAC). Poses of fewer than
+    /// ten matches are always scored with `Truncated`.
     pub loss: SearchScore,
     /// How sure the search is to be that it has seen a good sample before it stops, in `(0, 1)`.
     pub confidence: f64,
