@@ -76,6 +76,9 @@ pub(super) fn likely(square: f64) -> f64 {
     if square < INLIER { bounded(square, KNEE) } else { ANYWHERE }
 }
 
+/// What a scene costs more that is partly a plane: odds of 1 to 1,800.
+const MIXED: f64 = 15.0;
+
 /// The relief of a wall, as a share of a poster's.
 const EXACT: f64 = 0.1;
 
@@ -190,8 +193,8 @@ impl Bench {
             let likelihood = share * (-0.5 * on).exp() + (1.0 - share) * (-0.5 * free).exp();
             costs[0] += (-2.0 * likelihood.ln()).min(ANYWHERE);
         }
-        // The share is a number more.
-        costs[0] + count.max(1.0).ln()
+        // The share is a number more. A scene that may as well be a plane is taken for one, whose depths are known better.
+        costs[0] + count.max(1.0).ln() + MIXED
     }
 
     /// The same, of a scene with this relief.
