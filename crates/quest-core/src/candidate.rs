@@ -185,3 +185,23 @@ impl Deref for Candidates {
         &self.items[..self.len]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn kinds_and_reasons_have_names_of_their_own() {
+        use CandidateKind::{Exact, FromComplex, Planar, RotationOnly};
+        use Degeneracy::{Coincident, Collinear, Duplicate, PureRotation, RankDeficient, TooFewMatches};
+        let kinds: HashSet<_> = [Exact, FromComplex, RotationOnly, Planar].map(CandidateKind::name).into();
+        assert_eq!(kinds, ["exact", "from_complex", "rotation_only", "planar"].into());
+        let all = [TooFewMatches, Coincident, Duplicate, Collinear, RankDeficient, PureRotation];
+        let names: HashSet<_> = all.map(Degeneracy::name).into();
+        let words: HashSet<_> = all.map(|reason| reason.to_string()).into();
+        assert_eq!((names.len(), words.len()), (6, 6));
+        assert!(names.iter().all(|name| name.chars().all(|c| c.is_ascii_lowercase() || c == '_')));
+        assert!(words.iter().all(|text| text.contains(' ')));
+    }
+}

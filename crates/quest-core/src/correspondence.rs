@@ -361,4 +361,22 @@ mod tests {
         assert_eq!((clean.error(), clean.spread(&[true])), (None, vec![true]));
         assert!(Usable::from_image_points(&x1, &x2[..4]).is_err());
     }
+
+    #[test]
+    fn bearings_and_pixels_are_set_apart_too() {
+        let x1 = [[0.0, 0.0, 2.0], [0.0; 3], [0.1, 0.2, -3.0]];
+        let usable = Usable::from_bearings(&x1, &[[0.0, 0.0, 1.0]; 3]).unwrap();
+        let places = |usable: &Usable| usable.invalid.iter().map(|(place, _)| *place).collect::<Vec<_>>();
+        assert_eq!((usable.matches.len(), places(&usable)), (2, vec![1]));
+        assert!((usable.matches[1].length1() - 9.05_f64.sqrt()).abs() < 1e-12);
+        let camera = Camera::new(crate::CameraModel::Pinhole, &[500.0, 500.0, 320.0, 240.0]).unwrap();
+        let u1 = [[320.0, 240.0], [f64::NAN, 0.0], [820.0, 240.0]];
+        let usable = Usable::from_pixels(&camera, &u1, &camera, &[[320.0, 240.0]; 3]).unwrap();
+        assert_eq!((usable.matches.len(), places(&usable)), (2, vec![1]));
+        assert!((usable.matches[1].bearing1() - Vector3::new(1.0, 0.0, 1.0).normalize()).amax() < 1e-12);
+        let few = Usable::from_pixels(&camera, &u1, &camera, &[]).unwrap_err();
+        assert_eq!(few, InputError::LengthMismatch { first: 3, second: 0 });
+        assert_eq!(Usable::from_bearings(&x1, &[]).unwrap_err(), few);
+        assert_eq!(from_bearings(&x1, &[]).unwrap_err(), few);
+    }
 }

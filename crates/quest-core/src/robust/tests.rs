@@ -372,6 +372,30 @@ fn bad_input_is_refused_at_the_door() {
     assert_eq!(few, InputError::TooFewMatches { found: 4, needed: 5 }.into());
     let scores = Priors { scores: Some(&[1.0]), ..Priors::default() };
     assert!(estimate_with(&scene.matches, &options(), &scores).unwrap_err().to_string().contains("scores"));
+    let refused =
+        |priors: Priors| estimate_with(&scene.matches, &options(), &priors).unwrap_err().to_string();
+    let mut scores = [1.0; 20];
+    scores[7] = f64::NAN;
+    assert!(refused(Priors { scores: Some(&scores), ..Priors::default() }).contains("score of a match"));
+    let mut pose = scene.truth;
+    pose.t_21.y = f64::INFINITY;
+    assert!(refused(Priors { pose: Some(pose), ..Priors::default() }).contains("initial pose"));
+    let up = KnownDirection { in_view1: Vector3::y(), in_view2: Vector3::y(), tolerance: 0.1 };
+    for length in [0.0, f64::NAN, f64::INFINITY] {
+        for direction in [
+            KnownDirection { in_view1: up.in_view1 * length, ..up },
+            KnownDirection { in_view2: up.in_view2 * length, ..up },
+        ] {
+            assert!(
+                refused(Priors { direction: Some(direction), ..Priors::default() })
+                    .contains("known direction")
+            );
+        }
+    }
+    for tolerance in [-0.1, f64::NAN] {
+        let direction = Some(KnownDirection { tolerance, ..up });
+        assert!(refused(Priors { direction, ..Priors::default() }).contains("tolerance"));
+    }
     let line: Vec<_> = (0..20).map(|i| [0.01 * f64::from(i), 0.0]).collect();
     let collinear =
         correspondence::from_image_points(&line, &line.iter().map(|x| [x[0] * 1.1, 0.1]).collect::<Vec<_>>())

@@ -2,6 +2,7 @@
 
 mod controller;
 mod hostile;
+mod known_depths;
 mod laboratory;
 
 use super::*;

@@ -478,3 +478,6 @@ pub(crate) fn without_two(all: &[f64]) -> f64 {
     }
     all.iter().sum::<f64>() - largest[0] - largest[1]
 }
+
+#[cfg(test)]
+mod tests;

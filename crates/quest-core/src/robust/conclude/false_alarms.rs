@@ -94,6 +94,10 @@ pub(crate) fn false_matches(observations: &Observations) -> Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robust::data::image::Image;
+    use crate::robust::search::sampling;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use rand::RngExt;
 
     #[test]
     fn false_alarms_are_counted() {
@@ -109,5 +113,31 @@ mod tests {
         // False matches of which most agree exactly: thirty that do are no sign of anything, whatever the line says.
         let exact = Chance { errors: vec![0.0; 400], count: 1_000.0, of_a_pixel: 0.01 };
         assert!(least_log_false_alarms(100, &[1e-4; 30], &exact, 1e5) > 0.0);
+    }
+
+    #[test]
+    fn chance_is_the_share_of_a_band_in_the_image() {
+        let rng = &mut sampling::generator(0xfa_15, 0);
+        // A camera that moves to the side: epipolar lines are rows, and half of the matches would be behind it.
+        let mut pixel = || Vector3::new(rng.random_range(-0.5..0.5), rng.random_range(-0.5..0.5), 1.0);
+        let points: Vec<_> = (0..4_000).map(|_| [pixel(), pixel()]).collect();
+        let columns = Columns::of_points([Image::Plane([500.0; 2]); 2], 2.0, points.into_iter());
+        let chance =
+            Chance::new(&columns, &Motion { q_21: UnitQuaternion::identity(), direction: Vector3::x() });
+        // Both rows scatter: an error of one pixel is √2 of their difference, which is within ±r in 2 r/L for small r.
+        let expected = |error: f64| 0.5 * 2.0 * 2_f64.sqrt() * error / 500.0;
+        for error in [1.0, 2.0, 5.0] {
+            let share = chance.share(error);
+            // Three deviations of a count.
+            assert!(
+                (share - expected(error)).abs() < 3.0 * (expected(error) / 4_000.0).sqrt(),
+                "{error}: {share}"
+            );
+            assert!((chance.within(error) / expected(error) - 1.0).abs() < 0.35, "{error}");
+        }
+        assert!(chance.share(0.0) <= 0.0 && chance.within(0.0) <= 0.0);
+        // More than a line says, less two deviations of a count of hundred.
+        let dense = Chance { errors: vec![0.5; 100], count: 1_000.0, of_a_pixel: 1e-3 };
+        assert!((dense.within(1.0) - 0.08).abs() < 1e-12 && (dense.within(0.4) - 4e-4).abs() < 1e-15);
     }
 }

@@ -148,3 +148,60 @@ fn merged(q_21: &UnitQuaternion<f64>, all: &[Component]) -> Distribution {
     let [turn, t_21] = [0, 3].map(|k| Vector3::new(mean[k], mean[k + 1], mean[k + 2]));
     (RelativePose::new(UnitQuaternion::new(turn) * q_21, t_21), covariance)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A covariance of no pattern.
+    fn covariance() -> Matrix6<f64> {
+        let root = Matrix6::from_fn(|i, j| 0.1 * ((3 * i + 5 * j * j + 1) as f64).sin());
+        root * root.transpose() + Matrix6::identity() * 1e-3
+    }
+
+    fn start() -> UnitQuaternion<f64> {
+        UnitQuaternion::new(Vector3::new(0.3, -0.2, 0.1))
+    }
+
+    #[test]
+    fn a_mixture_has_the_mean_and_the_covariance_of_its_parts() {
+        let part = |nats: f64, mean: [f64; 6], variance: f64| Component {
+            nats,
+            mean: mean.into(),
+            covariance: Matrix6::identity() * variance,
+        };
+        // Three to one by the root of the likelihoods, which are nine to one.
+        let first = part(5.0, [0.02, 0.0, 0.0, 0.2, 0.0, 0.0], 1e-4);
+        let second = part(5.0 - 9_f64.ln(), [-0.02, 0.0, 0.0, 0.0, 0.4, 0.0], 4e-4);
+        let (pose, covariance) = merged(&start(), &[first, second]);
+        let turn = (pose.q_21 * start().inverse()).scaled_axis();
+        assert!((turn - Vector3::x() * 0.01).amax() < 1e-15, "{turn}");
+        assert!((pose.t_21 - Vector3::new(0.15, 0.1, 0.0)).amax() < 1e-15);
+        let apart = Vector6::new(0.04, 0.0, 0.0, 0.2, -0.4, 0.0);
+        let expected = Matrix6::identity() * 1.75e-4 + apart * apart.transpose() * (0.75 * 0.25);
+        assert!((covariance - expected).amax() < 1e-15, "{covariance}");
+    }
+
+    #[test]
+    fn with_the_rotation_held_the_translation_is_the_likeliest() {
+        let pose = RelativePose::new(
+            UnitQuaternion::new(Vector3::new(0.01, -0.02, 0.03)) * start(),
+            Vector3::new(0.1, 0.2, -0.1),
+        );
+        let (found, wider) = held(&start(), (pose, covariance()));
+        assert_eq!(found.q_21, start());
+        let turn = (start() * pose.q_21.inverse()).scaled_axis();
+        let step = found.t_21 - pose.t_21;
+        let by = Vector6::new(turn.x, turn.y, turn.z, step.x, step.y, step.z);
+        // The squared distance in units of the covariance has its least value there.
+        let slope = covariance().cholesky().unwrap().solve(&by);
+        assert!(slope.fixed_rows::<3>(3).amax() < 1e-12 * slope.amax(), "{slope}");
+        assert!((wider - covariance() - by * by.transpose()).amax() < 1e-15);
+    }
+
+    #[test]
+    fn a_covariance_in_another_unit_is_that_of_scaled_translations() {
+        let units = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 3.0, 3.0, 3.0));
+        assert!((in_unit(&covariance(), 3.0) - units * covariance() * units).amax() < 1e-15);
+    }
+}

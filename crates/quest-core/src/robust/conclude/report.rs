@@ -254,3 +254,53 @@ fn runner_up(poses: &mut PoseScorer, motion: Motion, noise: &Noise) -> RunnerUp 
         inlier_count: pose.inliers.len(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    fn motion(direction: [f64; 3]) -> Motion {
+        Motion {
+            q_21: UnitQuaternion::new(Vector3::new(0.1, 0.2, 0.0)),
+            direction: Vector3::from(direction).normalize(),
+        }
+    }
+
+    #[test]
+    fn the_answer_and_the_runner_up() {
+        let [best, other, given] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(motion);
+        let directions =
+            |(first, second): (Motion, Option<Motion>)| (first.direction, second.map(|m| m.direction));
+        let of = |answer, second| directions(chosen(answer, (best, second)));
+        assert_eq!(of(Answer::Best, Some(other)), (best.direction, Some(other.direction)));
+        assert_eq!(of(Answer::Other, Some(other)), (other.direction, Some(best.direction)));
+        assert_eq!(of(Answer::Other, None), (best.direction, None));
+        assert_eq!(of(Answer::Given(given), Some(other)), (given.direction, Some(best.direction)));
+        // Of two motions the farther one, where it is another.
+        let pose = RelativePose::new(best.q_21, best.direction * 0.3);
+        let far = |motions: [Option<Motion>; 2]| farther(&pose, motions).map(|m| m.direction);
+        let near = motion([1.0, 0.3, 0.0]);
+        for motions in [[Some(near), Some(other)], [Some(other), Some(near)], [Some(other), None]] {
+            assert_eq!(far(motions), Some(other.direction));
+        }
+        assert_eq!(
+            (far([None, Some(near)]), far([Some(best), None]), far([None, None])),
+            (Some(near.direction), None, None)
+        );
+    }
+
+    #[test]
+    fn the_normal_of_a_plane_is_that_of_its_homography() {
+        let pose = RelativePose::new(
+            UnitQuaternion::new(Vector3::new(0.1, -0.3, 0.2)),
+            Vector3::new(0.3, 0.1, -0.2),
+        );
+        let expected = Vector3::new(0.1, -0.2, 0.25);
+        for scale in [1.0, -2.5] {
+            let homography: Matrix3<f64> = (pose.r_21() + pose.t_21 * expected.transpose()) * scale;
+            let found = normal(&Plane { homography, motions: [None; 2] }, &pose).unwrap();
+            assert!((Vector3::from(found) - expected).amax() < 1e-12, "{found:?}");
+        }
+    }
+}

@@ -59,3 +59,17 @@ pub(crate) fn median_root(mut squares: Vec<f64>) -> f64 {
     }
     squares.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_model_leaves_is_capped() {
+        // In units of a variance of four: 1, 4 and the cap, less 0.25 each.
+        let found = excess(&[4.0, 16.0, 1e9], &[1.0; 3], 2.0);
+        assert!((found - (5.0 + CAP - 0.75) / 3.0).abs() < 1e-12, "{found}");
+        assert!(excess(&[], &[], 2.0).abs() <= 0.0);
+        assert_eq!((median_root(vec![9.0, 1.0, 4.0]), median_root(Vec::new())), (2.0, f64::INFINITY));
+    }
+}

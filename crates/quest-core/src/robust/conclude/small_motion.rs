@@ -475,3 +475,6 @@ fn without_chance(
     }
     (Polished { pose, ..polished }, is_likely)
 }
+
+#[cfg(test)]
+mod tests;

@@ -123,6 +123,25 @@ mod tests {
         let at_end = JointLimits { positions: &ends, ..free };
         assert!(joint_velocities(&twist, &jacobian(), 0.05, &at_end, &mut out) <= 0.0);
         assert!(out.iter().all(|s| *s == 0.0));
+        // Lists of other lengths, and velocities that no number holds.
+        let three = JointLimits { speeds: &[1.0; 3], ..free };
+        let some = JointLimits { positions: &ends[..3], ..free };
+        let huge = vec![[1e-300; 6]; 7];
+        let fast = Twist { linear: Vector3::repeat(1e300), ..twist };
+        for (jacobian, limits, twist) in [
+            (jacobian(), three, twist),
+            (jacobian(), some, twist),
+            (jacobian()[..6].to_vec(), free, twist),
+            (huge, free, fast),
+        ] {
+            out.fill(1.0);
+            let factor = joint_velocities(&twist, &jacobian, 0.0, &limits, &mut out);
+            assert!(
+                factor >= 0.0
+                    && out.iter().all(|s| s.abs() <= 1.0)
+                    && (factor > 0.0 || out.iter().all(|s| *s == 0.0))
+            );
+        }
         let bad = Twist { linear: Vector3::repeat(f64::NAN), ..twist };
         assert!(joint_velocities(&bad, &jacobian(), 0.05, &free, &mut out) <= 0.0);
         assert!(out.iter().all(|s| *s == 0.0));
