@@ -87,5 +87,6 @@ mod tests {
         assert_eq!(said, "found \"NaN\", expected `,` or `]`");
         let said = in_words(Category::Syntax, "key must be a string", "1");
         assert_eq!(said, "not JSON: key must be a string");
+        assert_eq!(words("expected value"), "expected value");
     }
 }

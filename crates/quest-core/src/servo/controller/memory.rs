@@ -171,3 +171,23 @@ impl Exploration {
         std::mem::take(&mut self.has_ended)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn an_exploration_is_as_fast_whatever_the_length_of_its_direction() {
+        let mut exploration = Exploration::default();
+        let safety = Safety::new(Limits { speed: 0.3, turn_rate: 1.0 });
+        let direction = Twist { linear: Vector3::y() * 4.0, ..Twist::zero() };
+        let commands: Vec<_> =
+            (0..10).map(|_| exploration.command(&direction, 0.0, 0.015, &safety, 0.1)).collect();
+        assert!(commands[..8].iter().all(Option::is_none));
+        // A third of the speed, then what is left of the way.
+        for (command, expected) in commands[8..].iter().zip([0.1, 0.05]) {
+            assert!((command.unwrap().linear - Vector3::y() * expected).amax() < 1e-12, "{command:?}");
+        }
+    }
+}

@@ -167,3 +167,28 @@ pub fn on_plane(camera: &Camera, pixel: [f64; 2]) -> Option<[f64; 2]> {
     let ray = camera.bearing(pixel).ok()?;
     (ray.z > 0.0).then(|| [ray.x / ray.z, ray.y / ray.z])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CameraModel;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_border_is_that_of_the_middle_row() {
+        let params = [500.0, 510.0, 330.0, 200.0, -0.2, 0.0, 0.0, 0.0];
+        let camera = Camera::new(CameraModel::OpenCv, &params).unwrap();
+        assert!(Border::of_camera(&camera, 10.0).is_none(), "a camera without a size");
+        let camera = camera.with_size(640, 480).unwrap();
+        let seen = |pixel: [f64; 2]| {
+            let [x, y] = on_plane(&camera, pixel).unwrap();
+            let back = camera.project(&Vector3::new(x, y, 1.0)).unwrap();
+            assert!((back[0] - pixel[0]).hypot(back[1] - pixel[1]) < 1e-6, "{back:?}");
+            x
+        };
+        let border = Border::of_camera(&camera, 10.0).unwrap();
+        assert!((border.left - seen([10.0, 240.0])).abs() < 1e-12);
+        assert!((border.right - seen([629.0, 240.0])).abs() < 1e-12);
+        assert!(seen([10.0, 0.0]) < border.left, "barrel distortion bends the border");
+    }
+}

@@ -159,6 +159,14 @@ fn commands_change_no_faster_than_the_acceleration_allows() {
 }
 
 #[test]
+fn a_turn_alone_changes_as_its_own_acceleration_allows() {
+    let acceleration = Some(Acceleration { linear: 0.5, angular: 1.0 });
+    let mut servo = servo(&far(Support::Full), Safety { acceleration, ..Safety::new(FREE) });
+    servo.law_mut().twist = Twist::drive(0.0, 2.0);
+    assert!(is_near(&servo.step(&IMAGE).command, &Twist::drive(0.0, 0.1)));
+}
+
+#[test]
 fn an_image_that_is_old_out_of_order_or_without_a_time_is_stale() {
     let safety = Safety { largest_gap: 0.5, ..Safety::new(FREE) };
     let mut servo = servo(&far(Support::Full), safety);
