@@ -114,7 +114,7 @@ impl Worth for Marginalised {
 }
 
 /// The name of [`SearchScore`] before version 0.2.
-#[deprecated(since = "0.2.0", note = "it is called `SearchScore` now")]
+#[deprecated(since = "0.1.0", note = "it is called `SearchScore` now")]
 pub type Loss = SearchScore;
 
 /// No search score has this name.
