@@ -15,19 +15,15 @@ def read(name):
     return {record["name"]: record for record in records}
 
 
-def chord(a, b):
-    """The distance of two points, which keeps its digits where the cosine of their angle has lost them."""
-    return math.dist(a, b)
-
-
+# Angles are taken from distances, which keep their digits where a cosine has lost them.
 def rotation_angle(a, b):
     entries = [[x for row in record["R_21"] for x in row] for record in (a, b)]
-    return math.degrees(chord(*entries) / math.sqrt(2))
+    return math.degrees(math.dist(*entries) / math.sqrt(2))
 
 
 def direction_angle(a, b):
     units = [[x / math.hypot(*record["t_21"]) for x in record["t_21"]] for record in (a, b)]
-    return math.degrees(chord(*units))
+    return math.degrees(math.dist(*units))
 
 
 def compare(name, other):

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::servo::estimators::source::PoseSource;
 use crate::solver::{Kinds, SolverName};
-use crate::{Candidates, Correspondence, RelativePose};
+use crate::{Candidates, Correspondence, RelativePose, feasibility};
 
 /// Below so many features all candidates are tried, not those of the consensus alone.
 pub(crate) const FEW: usize = 25;
@@ -205,9 +205,12 @@ impl Consensus {
     /// A pose and its twisted pair have the same Sampson errors: rounding decided which of them was the best.
     fn is_in_front(&self, pose: &RelativePose, sigma: f64) -> bool {
         let agree = self.matches.iter().filter(|m| (pose.sampson_error(m) / sigma).powi(2) < AGREES);
-        let balance =
-            agree.filter_map(|m| pose.depths(m)).map(|(z1, z2)| if z1 > 0.0 && z2 > 0.0 { 1 } else { -1 });
-        balance.sum::<i32>() > 0
+        let (mut in_front, mut all) = (0, 0);
+        for m in agree {
+            in_front += feasibility::in_front(pose, std::slice::from_ref(m));
+            all += 1;
+        }
+        2 * in_front > all
     }
 
     /// The score of a pose with what the depths say: those of a match that agrees are positive and near their mean.
@@ -244,7 +247,7 @@ impl Consensus {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::{Unit, UnitQuaternion, Vector3};
     use rand::SeedableRng;
 
     use super::*;
@@ -268,7 +271,7 @@ mod tests {
         let seen: Vec<_> = seen.collect();
         // Turned by 180° about the baseline, in either direction of it.
         let half_turn =
-            UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(truth.t_21), std::f64::consts::PI);
+            UnitQuaternion::from_axis_angle(&Unit::new_normalize(truth.t_21), std::f64::consts::PI);
         let turned = half_turn * truth.q_21;
         for (pose, is_true) in [
             (RelativePose::new(turned, truth.t_21), false),
