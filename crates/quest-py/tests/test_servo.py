@@ -105,14 +105,15 @@ def test_bad_images_make_no_wild_command(kind: Any, bad: Array, depths: Any) -> 
     R, t = np.eye(3), np.array([0.0, 0.0, 0.3])
     states = []
     for k in range(400):
-        command = loop.step(bad if 60 <= k < 110 else image(R, t))
+        command = loop.step(bad if 80 <= k < 130 else image(R, t))
         states.append(command.state)
         assert np.isfinite([command.linear, command.angular]).all()
         assert np.linalg.norm(command.linear) <= 0.3
         assert np.linalg.norm(command.angular) <= 0.4
         turn = rotation(-0.1 * command.angular) if command.angular.any() else np.eye(3)
         R, t = turn @ R, turn @ t - 0.1 * command.linear
-    assert states[59] == "tracking"
+    # It was under way, its depths learnt, when the bad images came.
+    assert states[79] == "tracking"
     assert np.linalg.norm(t) < 0.6
 
 
