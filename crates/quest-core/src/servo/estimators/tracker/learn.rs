@@ -1,6 +1,7 @@
 //! The map learns: key images, steps of the adjustment, planes.
 
 use crate::servo::estimators::source::PoseSource;
+use crate::servo::estimators::tracker::adjust::Survey;
 use crate::servo::estimators::tracker::map::PLANE_RELIEF;
 use crate::servo::estimators::tracker::resection::{INLIER, KNEE, Task, bounded, residuals};
 use crate::servo::estimators::tracker::{Phase, Tracker};
@@ -44,6 +45,7 @@ impl<S: PoseSource> Tracker<S> {
 
     /// One step of a map, or its judgement. With few features the last step and the judgement share an image.
     fn adjust(&mut self, k: usize, task: &Task) {
+        let noise = self.start.noise_share();
         let survey = Self::survey(&self.goal, &self.known, &self.keys[..self.key_count], task);
         let map = &mut self.hypotheses[k].map;
         if map.steps_left > 0 {
@@ -60,7 +62,7 @@ impl<S: PoseSource> Tracker<S> {
                 return;
             }
         }
-        self.workspace.judge(map, &survey);
+        self.workspace.judge(map, &Survey { noise, ..survey });
         if std::mem::take(&mut map.is_to_be_judged) {
             self.reconsider_plane(k);
         }

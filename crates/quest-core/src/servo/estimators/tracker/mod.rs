@@ -236,7 +236,15 @@ impl<S: PoseSource> Tracker<S> {
         keys: &'a [KeyImage],
         task: &Task,
     ) -> Survey<'a> {
-        Survey { goal, known, keys, goal_variance: task.place_variance, ground: task.ground, chosen: &[] }
+        Survey {
+            goal,
+            known,
+            keys,
+            goal_variance: task.place_variance,
+            ground: task.ground,
+            chosen: &[],
+            noise: 1.0,
+        }
     }
 
     fn seen(&self) -> usize {
@@ -363,7 +371,8 @@ impl<S: PoseSource> Tracker<S> {
             let is_known = ready
                 .iter()
                 .any(|h| h.is_like(from) && (h.map.is_planar() == from.map.is_planar() || Some(k) != other));
-            if is_known || (self.goal.len() >= FEW && from.score > best + HOPELESS) {
+            let is_hopeless = self.goal.len() >= FEW && from.score > best + HOPELESS && Some(k) != other;
+            if is_known || is_hopeless {
                 continue;
             }
             new.map.copy_from(&from.map);

@@ -29,7 +29,8 @@ pub(super) fn cost(
             }
             let x2 = r_21 * Vector3::new(point.place[0], point.place[1], 1.0) + pose.t_21 * point.rho;
             let square = if x2.z > 0.02 {
-                ((x2.x / x2.z - z[0]).powi(2) + (x2.y / x2.z - z[1]).powi(2)) / image.variance
+                ((x2.x / x2.z - z[0]).powi(2) + (x2.y / x2.z - z[1]).powi(2))
+                    / (survey.noise * image.variance)
             } else {
                 f64::MAX
             };
@@ -41,8 +42,8 @@ pub(super) fn cost(
             continue;
         }
         let goal = survey.goal[i];
-        sum +=
-            ((point.place[0] - goal[0]).powi(2) + (point.place[1] - goal[1]).powi(2)) / survey.goal_variance;
+        sum += ((point.place[0] - goal[0]).powi(2) + (point.place[1] - goal[1]).powi(2))
+            / (survey.noise * survey.goal_variance);
         sum += match survey.known[i] {
             Some(known) => (point.rho - known.rho).powi(2) / known.variance,
             None => ((point.rho - normal.x * goal[0] - normal.y * goal[1] - normal.z) / relief).powi(2),

@@ -101,7 +101,7 @@ impl Workspace {
         for (key, (image, pose)) in survey.keys.iter().zip(&map.keys).enumerate() {
             let Some(z) = image.frame[i] else { continue };
             let Some((by_pose, by_point, error, weight)) =
-                derivatives(&map.points[i], pose, z, image.variance)
+                derivatives(&map.points[i], pose, z, survey.noise * image.variance)
             else {
                 continue;
             };
@@ -147,7 +147,7 @@ impl Workspace {
         g: &mut [f64; 3],
     ) {
         let point = &map.points[i];
-        let place = 1.0 / survey.goal_variance;
+        let place = 1.0 / (survey.noise * survey.goal_variance);
         v[0] += place;
         v[2] += place;
         for k in 0..2 {

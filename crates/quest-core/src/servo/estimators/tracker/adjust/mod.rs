@@ -29,6 +29,8 @@ pub(crate) struct Survey<'a> {
     /// The variance of a coordinate of the goal's features.
     pub(crate) goal_variance: f64,
     pub(crate) ground: Option<Ground>,
+    /// The share of all variances that the matches show.
+    pub(crate) noise: f64,
     /// Only these features take part; all where it is empty.
     pub(crate) chosen: &'a [bool],
 }
@@ -197,6 +199,7 @@ mod tests {
             goal_variance: 1e-6,
             ground: None,
             chosen: &[],
+            noise: 1.0,
         };
         assert!(Workspace::new(goal.len(), 1).step(&mut map, &survey));
         map

@@ -1,11 +1,11 @@
 //! The answers of the start on one scale.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{FEW, PLANE, POOL, TRANSLATION, Terms, WRONG_WAY};
 use crate::RelativePose;
 use crate::servo::estimators::tracker::hypothesis::Hypothesis;
-use crate::servo::estimators::tracker::map::{KeyImage, PLANE_SLOPE};
+use crate::servo::estimators::tracker::map::{KeyImage, PLANE_RELIEF, PLANE_SLOPE};
 use crate::servo::estimators::tracker::resection::{INLIER, KNEE, Point, Task, bounded, resect, residuals};
 
 /// Puts the answer at `count` in its place, unless a better one like it is there, or takes the place of a worse one.
@@ -67,12 +67,23 @@ pub(super) fn judge(
     new.start_cost = new.map.cost;
 }
 
-/// A squared residual as evidence. A wrong match is anywhere in the image: minus twice the log of its likelihood, relative to that of a
-/// right one, is `2 ln(A / 2πσ²)`, 22 for half a pixel and an image of a radian, and a few are expected.
-pub(super) fn likely(square: f64) -> f64 {
-    const ANYWHERE: f64 = 25.0;
-    if square < INLIER { bounded(square, KNEE) } else { ANYWHERE }
+/// A wrong match is anywhere in the image: minus twice the log of its likelihood, relative to that of a right one, is `2 ln(A / 2πσ²)`, 22
+/// for half a pixel and an image of a radian, and a few are expected.
+const ANYWHERE: f64 = 25.0;
+
+/// What a wrong match costs beside right ones with this share of the variance that was told.
+pub(super) fn anywhere(noise: f64) -> f64 {
+    ANYWHERE - 2.0 * noise.ln()
 }
+
+/// A squared residual as evidence, where a wrong match costs `anywhere`.
+pub(super) fn likely(square: f64, anywhere: f64) -> f64 {
+    if square < INLIER { bounded(square, KNEE) } else { anywhere }
+}
+
+/// What a scene costs more that is partly a plane. A plane with wrong matches that lie on their epipolar lines by chance is to come first;
+/// the scene is kept beside it, and the first motion tells them apart.
+const MIXED: f64 = 40.0;
 
 /// The relief of a wall, as a share of a poster's.
 const EXACT: f64 = 0.1;
@@ -80,7 +91,11 @@ const EXACT: f64 = 0.1;
 /// What the judgement works with.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
+    /// The share of the variance that was told which the matches show.
+    pub(super) noise: f64,
     points: Vec<Point>,
+    /// What each feature costs on the plane.
+    on_plane: Vec<f64>,
     squares: Vec<f64>,
     scratch: Vec<f64>,
 }
@@ -89,7 +104,9 @@ impl Bench {
     pub(super) fn new(features: usize) -> Self {
         let empty = Point { place: [0.0; 2], rho: 1.0, variance: 0.0, is_mapped: false };
         Self {
+            noise: 1.0,
             points: vec![empty; features],
+            on_plane: vec![f64::NAN; features],
             squares: vec![f64::NAN; features],
             scratch: Vec::with_capacity(features),
         }
@@ -112,9 +129,93 @@ impl Bench {
         let within = self.score_with(h, h.map.relief, image, chosen, terms);
         if h.map.is_planar() {
             within.min(self.score_with(h, EXACT * h.map.relief, image, chosen, terms))
+        } else if terms.goal.len() >= FEW {
+            let mixed = within.min(self.score_mixed(h, PLANE_RELIEF, image, chosen, terms));
+            if self.noise < 1.0 {
+                return mixed.min(self.score_mixed(h, EXACT * PLANE_RELIEF, image, chosen, terms));
+            }
+            mixed
         } else {
+            // Of few features several are near any plane.
             within
         }
+    }
+
+    /// The same, of a scene most of which may be a plane: each feature is on it or anywhere, and the share of those on it is free.
+    ///
+    /// A box in front of a wall is such a scene. As a scene with relief it pays for the freedom of depths that are all alike, and a
+    /// rotation or a wrong plane won.
+    fn score_mixed(
+        &mut self,
+        h: &Hypothesis,
+        flat: f64,
+        image: &KeyImage,
+        chosen: &[bool],
+        terms: &Terms<'_>,
+    ) -> f64 {
+        let plane = plane_through(&h.map.points, h.map.normal, terms.goal, chosen);
+        let task = Task {
+            variance: self.noise * image.variance,
+            place_variance: self.noise * terms.task.place_variance,
+            mapped_only: true,
+            depth_variance: None,
+            iterations: 10,
+            ..terms.task
+        };
+        let (flat, free) = (flat * flat, h.map.relief * h.map.relief);
+        for (i, point) in self.points.iter_mut().enumerate() {
+            let place = terms.goal[i];
+            let on_plane = plane.dot(&Vector3::new(place[0], place[1], 1.0));
+            let off = (h.map.points[i].rho - on_plane).powi(2);
+            let is_on = off < (free / flat).ln() * flat;
+            let (rho, variance) = terms.known[i]
+                .map_or((on_plane, if is_on { flat } else { free }), |known| (known.rho, known.variance));
+            *point = Point { place, rho, variance, is_mapped: chosen[i] };
+        }
+        let adjusted = h.map.keys[0];
+        residuals(&self.points, &image.frame, &adjusted, &task, &mut self.squares);
+        let Self { points, squares, scratch, .. } = self;
+        let fit = resect(points, &image.frame, &adjusted, &task, squares, scratch);
+        let first = self.evidence_mixed(&adjusted, image, &task, [flat, free], terms);
+        let other = fit
+            .map_or(f64::INFINITY, |fit| self.evidence_mixed(&fit.pose, image, &task, [flat, free], terms));
+        first.min(other) + prior(&adjusted, &plane, terms)
+    }
+
+    /// What the mean image says of a pose where each feature's depth has one of two variances.
+    fn evidence_mixed(
+        &mut self,
+        pose: &RelativePose,
+        image: &KeyImage,
+        task: &Task,
+        variances: [f64; 2],
+        terms: &Terms<'_>,
+    ) -> f64 {
+        let (mut sum, most) = (0.0, anywhere(self.noise));
+        for (class, variance) in variances.into_iter().enumerate() {
+            for (point, known) in self.points.iter_mut().zip(terms.known) {
+                point.variance = known.map_or(variance, |known| known.variance);
+            }
+            residuals(&self.points, &image.frame, pose, task, &mut self.squares);
+            let widths = Widths::new(pose, task);
+            for ((square, point), cost) in self.squares.iter_mut().zip(&self.points).zip(&mut self.on_plane) {
+                let this = (likely(*square, most) + widths.of(point)).min(most);
+                if class == 0 {
+                    *cost = this;
+                } else {
+                    *square = if square.is_nan() { f64::NAN } else { this };
+                }
+            }
+        }
+        let pairs = || self.on_plane.iter().zip(&self.squares).filter(|(_, free)| !free.is_nan());
+        let count = pairs().count() as f64;
+        let share = (pairs().filter(|(on, free)| on < free).count() as f64 + 1.0) / (count + 2.0);
+        for (on, free) in pairs() {
+            let likelihood = share * (-0.5 * on).exp() + (1.0 - share) * (-0.5 * free).exp();
+            sum += (-2.0 * likelihood.ln()).min(most);
+        }
+        // The share is a number more. A scene that may as well be a plane is taken for one, whose depths are known better.
+        sum + count.max(1.0).ln() + MIXED
     }
 
     /// The same, of a scene with this relief.
@@ -134,7 +235,8 @@ impl Bench {
             *point = Point { place, rho, variance, is_mapped: chosen[i] };
         }
         let task = Task {
-            variance: image.variance,
+            variance: self.noise * image.variance,
+            place_variance: self.noise * terms.task.place_variance,
             mapped_only: true,
             depth_variance: None,
             iterations: 10,
@@ -142,34 +244,72 @@ impl Bench {
         };
         let adjusted = h.map.keys[0];
         let first = self.evidence(&adjusted, image, &task);
-        let Self { points, squares, scratch } = self;
+        let Self { points, squares, scratch, .. } = self;
         let fit = resect(points, &image.frame, &adjusted, &task, squares, scratch);
         let other = fit.map_or(f64::INFINITY, |fit| self.evidence(&fit.pose, image, &task));
-        // A start is within about the features' depth of its goal, and a radian.
-        let (turn, far) = (adjusted.q_21.angle(), adjusted.t_21.norm_squared());
-        let wrong_way = terms.travel.norm() > 1e-3 && adjusted.inverse().t_21.dot(&terms.travel) < 0.0;
-        let slope = (h.map.normal.x.powi(2) + h.map.normal.y.powi(2)) / PLANE_SLOPE.powi(2);
-        first.min(other) + slope + turn * turn + far + if wrong_way { WRONG_WAY } else { 0.0 }
+        first.min(other) + prior(&adjusted, &h.map.normal, terms)
     }
 
     /// What the mean image says of a pose. Leaves the squared residuals in `squares`.
     fn evidence(&mut self, pose: &RelativePose, image: &KeyImage, task: &Task) -> f64 {
         residuals(&self.points, &image.frame, pose, task, &mut self.squares);
-        let cost: f64 = self.squares.iter().filter(|s| !s.is_nan()).map(|s| likely(*s)).sum();
+        let cost: f64 =
+            self.squares.iter().filter(|s| !s.is_nan()).map(|s| likely(*s, anywhere(self.noise))).sum();
         cost + self.width(pose, image, task)
     }
 
     /// The log of the determinant: what the freedom of the depths would fit by chance.
     fn width(&self, pose: &RelativePose, image: &KeyImage, task: &Task) -> f64 {
-        let (r_21, t_21) = (pose.r_21(), &pose.t_21);
-        let sigma2 = task.variance + task.place_variance;
+        let widths = Widths::new(pose, task);
         let seen = self.points.iter().zip(&image.frame).filter(|(p, z)| p.is_mapped && z.is_some());
-        let of = |point: &Point| {
-            let x2 = r_21 * Vector3::new(point.place[0], point.place[1], 1.0) + t_21 * point.rho;
-            let z = x2.z.max(0.02);
-            let a = [t_21.x - x2.x / z * t_21.z, t_21.y - x2.y / z * t_21.z];
-            (point.variance * (a[0] * a[0] + a[1] * a[1]) / (z * z) / sigma2).ln_1p()
-        };
-        seen.map(|(point, _)| of(point)).sum()
+        seen.map(|(point, _)| widths.of(point)).sum()
     }
+}
+
+/// What the freedom of a depth would fit by chance, at a pose.
+struct Widths {
+    r_21: Matrix3<f64>,
+    t_21: Vector3<f64>,
+    variance: f64,
+}
+
+impl Widths {
+    fn new(pose: &RelativePose, task: &Task) -> Self {
+        Self { r_21: pose.r_21(), t_21: pose.t_21, variance: task.variance + task.place_variance }
+    }
+
+    fn of(&self, point: &Point) -> f64 {
+        let t_21 = &self.t_21;
+        let x2 = self.r_21 * Vector3::new(point.place[0], point.place[1], 1.0) + t_21 * point.rho;
+        let z = x2.z.max(0.02);
+        let a = [t_21.x - x2.x / z * t_21.z, t_21.y - x2.y / z * t_21.z];
+        (point.variance * (a[0] * a[0] + a[1] * a[1]) / (z * z) / self.variance).ln_1p()
+    }
+}
+
+/// A start is within about the features' depth of its goal, and a radian; planes are not steep.
+fn prior(pose: &RelativePose, plane: &Vector3<f64>, terms: &Terms<'_>) -> f64 {
+    let (turn, far) = (pose.q_21.angle(), pose.t_21.norm_squared());
+    let wrong_way = terms.travel.norm() > 1e-3 && pose.inverse().t_21.dot(&terms.travel) < 0.0;
+    let slope = (plane.x.powi(2) + plane.y.powi(2)) / PLANE_SLOPE.powi(2);
+    slope + turn * turn + far + if wrong_way { WRONG_WAY } else { 0.0 }
+}
+
+/// The plane that most of the inverse depths are near, from one that is known.
+fn plane_through(points: &[Point], first: Vector3<f64>, goal: &[[f64; 2]], chosen: &[bool]) -> Vector3<f64> {
+    /// Those off by three reliefs of a plane count less and less.
+    const SCALE: f64 = 3.0 * PLANE_RELIEF;
+    let mut plane = first;
+    for _ in 0..10 {
+        let (mut a, mut b) = (Matrix3::identity() * 1e-9, Vector3::zeros());
+        for ((point, goal), _) in points.iter().zip(goal).zip(chosen).filter(|(_, chosen)| **chosen) {
+            let m = Vector3::new(goal[0], goal[1], 1.0);
+            let weight = 1.0 / (1.0 + ((point.rho - plane.dot(&m)) / SCALE).powi(2));
+            a += m * m.transpose() * weight;
+            b += m * (weight * point.rho);
+        }
+        let Some(factor) = a.cholesky() else { return first };
+        plane = factor.solve(&b);
+    }
+    if plane.iter().all(|x| x.is_finite()) { plane } else { first }
 }

@@ -5,7 +5,8 @@
 //! 3. Proposals (`proposal.rs`): the flat scene, the consensus's poses, the candidates of all that agree, planes, and at last the reversed scene of the
 //!    best. Each is adjusted with the bounded cost (`adjust/`), as a scene with relief and as a plane.
 //! 4. The judgement (`judgement.rs`): rotation, plane and relief on one scale, minus twice the log of the marginal likelihood. The determinant counts
-//!    what so many free depths would fit by chance; without it free depths always win.
+//!    what so many free depths would fit by chance; without it free depths always win. Where the matches show less noise than was told, all answers are
+//!    judged again by that.
 
 mod judgement;
 mod proposal;
@@ -37,6 +38,10 @@ const STEPS: usize = 15;
 /// The largest cost a feature of an answer: a wrong match costs 18, a right one 2, and at most half of them are wrong. More costs an
 /// adjustment that has not come to its minimum.
 const MOST_COST: f64 = 11.0;
+/// A judgement of many features takes as long as so many steps.
+const JUDGEMENT: usize = 4;
+/// Answers that are judged again in an image: each takes a third of a millisecond.
+const JUDGED: usize = 3;
 /// Room for all of them: 25 candidates, as a scene and as a plane, and four planes.
 const PROPOSALS: usize = 64;
 /// What a translation costs, and a plane's normal: the logs of their priors over their precisions, in steps of two a number.
@@ -51,6 +56,8 @@ enum Stage {
     Sampling,
     Proposing,
     Adjusting,
+    /// By the noise that the matches show.
+    Judging,
 }
 
 /// What the start has come to.
@@ -131,6 +138,11 @@ impl Start {
         }
     }
 
+    /// The share of the variance that was told which the matches of the start show.
+    pub(crate) fn noise_share(&self) -> f64 {
+        self.bench.noise
+    }
+
     pub(crate) fn begin(&mut self) {
         self.stage = Stage::Averaging;
         self.first_images.clear();
@@ -180,6 +192,7 @@ impl Start {
                 Progress::Going
             }
             Stage::Adjusting => self.adjust(workspace, terms),
+            Stage::Judging => self.judge_again(terms),
         }
     }
 
@@ -202,6 +215,7 @@ impl Start {
     fn propose(&mut self, source: &mut impl PoseSource, sigma: f64, terms: &Terms<'_>) {
         (self.count, self.next, self.is_adjusting) = (0, 0, false);
         self.proposals.clear();
+        self.bench.noise = 1.0;
         self.rotation = self.best_rotation(sigma, terms);
         let n = self.consensus.matches.len();
         let flat = self.rotation.map_or(RelativePose::identity(), |fit| fit.pose);
@@ -247,6 +261,7 @@ impl Start {
             goal_variance: terms.task.place_variance,
             ground: terms.task.ground,
             chosen: &self.chosen,
+            noise: 1.0,
         };
         let mut is_done = false;
         while left > 0 {
@@ -274,6 +289,9 @@ impl Start {
             let settled = falls && before - new.map.cost < 1e-3 * new.map.cost + 1e-3;
             if settled || self.steps >= STEPS || new.map.damping > 1e5 {
                 self.is_adjusting = false;
+                if n >= FEW {
+                    left = left.saturating_sub(JUDGEMENT);
+                }
                 workspace.judge(&mut new.map, &survey);
                 judge(new, &mut self.bench, &keys[0], &self.chosen, terms);
                 let explained = explained(new, &keys[0], &self.chosen);
@@ -285,11 +303,67 @@ impl Start {
         }
         let [mean] = keys;
         self.mean = mean;
-        if !is_done {
+        if is_done { self.after_adjusting(terms) } else { Progress::Going }
+    }
+
+    /// What is left to do once all proposals are adjusted.
+    fn after_adjusting(&mut self, terms: &Terms<'_>) -> Progress {
+        self.failures = if self.count == 0 { self.failures + 1 } else { 0 };
+        if self.count == 0 && self.rotation.is_none() {
+            return Progress::Nothing;
+        }
+        self.bench.noise = self.noise(terms);
+        if self.bench.noise >= 1.0 {
+            return Progress::Done;
+        }
+        (self.stage, self.next) = (Stage::Judging, 0);
+        Progress::Going
+    }
+
+    /// Judges the answers again by the noise that the matches show, where that is less than what was told.
+    ///
+    /// A detector is told as noisy as its worst matches are, several times as noisy as most of them. By so large a noise a scene with
+    /// relief may as well be a plane, or a turn.
+    fn judge_again(&mut self, terms: &Terms<'_>) -> Progress {
+        for h in self.pool[..self.count].iter_mut().skip(self.next).take(JUDGED) {
+            judge(h, &mut self.bench, &self.mean, &self.chosen, terms);
+        }
+        self.next += JUDGED;
+        if self.next < self.count {
             return Progress::Going;
         }
-        self.failures = if self.count == 0 { self.failures + 1 } else { 0 };
-        if self.count == 0 && self.rotation.is_none() { Progress::Nothing } else { Progress::Done }
+        self.pool[..self.count].sort_by(|a, b| a.score.total_cmp(&b.score));
+        self.rotation = self.rotation.and_then(|fit| self.fit_rotation(&fit.pose, terms));
+        Progress::Done
+    }
+
+    /// The share of the variance that was told which the matches show by the answer that fits them best; at most one, and one of few
+    /// matches.
+    fn noise(&mut self, terms: &Terms<'_>) -> f64 {
+        /// Seven in ten matches are right at least; the squares of that share of right ones are below this in units of their variance.
+        const SHARE: (usize, usize) = (7, 10);
+        const QUANTILE: f64 = 1.074;
+        /// The errors of real matches have longer tails than normal ones: half as large again.
+        const MARGIN: f64 = 1.5;
+        /// A fifth of the standard deviation that was told, not less: nothing is known so well.
+        const LEAST: f64 = 0.04;
+        /// Of 25 matches with the noise that was told two starts in a thousand show less than this, of forty one in ten thousand.
+        const CLEARLY: f64 = 0.5;
+        let n = self.consensus.matches.len();
+        if n < FEW {
+            return 1.0;
+        }
+        let place = SHARE.0 * (n - 1) / SHARE.1;
+        let mut least = f64::INFINITY;
+        for h in &self.pool[..self.count] {
+            self.scratch.clear();
+            self.scratch
+                .extend(self.consensus.matches.iter().map(|m| h.map.keys[0].sampson_error(m).powi(2)));
+            let (_, &mut square, _) = self.scratch.select_nth_unstable_by(place, f64::total_cmp);
+            least = least.min(square);
+        }
+        let seen = MARGIN * MARGIN * least / QUANTILE / (self.mean.variance + terms.task.place_variance);
+        if seen < CLEARLY { seen.max(LEAST) } else { 1.0 }
     }
 
     /// Adds the reversed scene of the best answer, once: `t → −t`, `ρ → 2 − ρ` fits as well where the parallax is small.

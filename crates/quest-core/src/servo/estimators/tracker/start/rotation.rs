@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand::RngExt;
 
-use super::judgement::likely;
+use super::judgement::{anywhere, likely};
 use super::{POOL, Start, Terms};
 use crate::servo::estimators::tracker::resection::{Fit, INLIER, KNEE, Task, resect, residuals};
 use crate::{Correspondence, RelativePose};
@@ -25,8 +25,14 @@ impl Start {
                 best = (cost, RelativePose::new(q_21, Vector3::zeros()));
             }
         }
+        self.fit_rotation(&best.1, terms)
+    }
+
+    /// The rotation of the mean image, from one that is about right.
+    pub(super) fn fit_rotation(&mut self, about: &RelativePose, terms: &Terms<'_>) -> Option<Fit> {
         let task = Task {
-            variance: self.mean.variance,
+            variance: self.bench.noise * self.mean.variance,
+            place_variance: self.bench.noise * terms.task.place_variance,
             depth_variance: Some(0.0),
             is_translation_fixed: true,
             mapped_only: false,
@@ -35,12 +41,13 @@ impl Start {
         };
         self.pool[POOL].map.forget(terms.goal, terms.known, terms.relief);
         let points = &self.pool[POOL].map.points;
-        residuals(points, &self.mean.frame, &best.1, &task, &mut self.squares);
-        let mut fit = resect(points, &self.mean.frame, &best.1, &task, &mut self.squares, &mut self.scratch)?;
+        residuals(points, &self.mean.frame, about, &task, &mut self.squares);
+        let mut fit = resect(points, &self.mean.frame, about, &task, &mut self.squares, &mut self.scratch)?;
         residuals(points, &self.mean.frame, &fit.pose, &task, &mut self.squares);
         // The start's features alone, so that all scores are of the same matches.
         let chosen = || self.squares.iter().zip(&self.chosen).filter(|(_, chosen)| **chosen).map(|(s, _)| *s);
-        fit.cost = chosen().map(likely).sum();
+        let anywhere = anywhere(self.bench.noise);
+        fit.cost = chosen().map(|s| likely(s, anywhere)).sum();
         fit.inliers = chosen().filter(|s| *s < INLIER).count();
         fit.seen = chosen().count();
         Some(fit)
