@@ -8,6 +8,9 @@ use crate::servo::twist::Limits;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterOptions {
     /// Standard deviation of the coordinates in the current image on the plane z = 1: pixels divided by the focal length.
+    ///
+    /// That of the worst tenth of the matches will do. Where 25 of them or more show less, [`Tracker`](crate::servo::Tracker) judges
+    /// its start by what they show.
     pub noise: f64,
     /// The same for the goal image. It is smaller by √k where k goal images are averaged.
     pub goal_noise: f64,
