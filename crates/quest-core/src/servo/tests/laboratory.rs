@@ -141,7 +141,7 @@ fn the_corner_of_a_room_is_not_taken_for_a_wall() {
         let (metres, degrees) = off(&camera.pose());
         arrived += u64::from(metres < 0.02 && degrees < 1.0);
     }
-    // Eight to ten are lost by the noise that was told.
+    // By the noise that was told six are lost.
     assert!(arrived + 4 >= starts, "{arrived} of {starts}");
 }
 

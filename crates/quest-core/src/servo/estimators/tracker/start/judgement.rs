@@ -141,6 +141,18 @@ impl Bench {
         }
     }
 
+    /// How the mean image is fitted.
+    fn task(&self, image: &KeyImage, terms: &Terms<'_>) -> Task {
+        Task {
+            variance: self.noise * image.variance,
+            place_variance: self.noise * terms.task.place_variance,
+            mapped_only: true,
+            depth_variance: None,
+            iterations: 10,
+            ..terms.task
+        }
+    }
+
     /// The same, of a scene most of which may be a plane: each feature is on it or anywhere, and the share of those on it is free.
     ///
     /// A box in front of a wall is such a scene. As a scene with relief it pays for the freedom of depths that are all alike, and a
@@ -154,14 +166,7 @@ impl Bench {
         terms: &Terms<'_>,
     ) -> f64 {
         let plane = plane_through(&h.map.points, h.map.normal, terms.goal, chosen);
-        let task = Task {
-            variance: self.noise * image.variance,
-            place_variance: self.noise * terms.task.place_variance,
-            mapped_only: true,
-            depth_variance: None,
-            iterations: 10,
-            ..terms.task
-        };
+        let task = self.task(image, terms);
         let (flat, free) = (flat * flat, h.map.relief * h.map.relief);
         for (i, point) in self.points.iter_mut().enumerate() {
             let place = terms.goal[i];
@@ -234,14 +239,7 @@ impl Bench {
                 terms.known[i].map_or((h.map.on_plane(place), relief), |known| (known.rho, known.variance));
             *point = Point { place, rho, variance, is_mapped: chosen[i] };
         }
-        let task = Task {
-            variance: self.noise * image.variance,
-            place_variance: self.noise * terms.task.place_variance,
-            mapped_only: true,
-            depth_variance: None,
-            iterations: 10,
-            ..terms.task
-        };
+        let task = self.task(image, terms);
         let adjusted = h.map.keys[0];
         let first = self.evidence(&adjusted, image, &task);
         let Self { points, squares, scratch, .. } = self;
