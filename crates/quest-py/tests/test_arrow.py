@@ -180,7 +180,10 @@ def test_a_row_that_is_no_pair_costs_no_other_its_pose() -> None:
         (lambda t: t.set_column(1, "x1", t.column("score")), "expected lists of points"),
         (lambda t: t.set_column(7, "score", t.column("x1")), "expected lists of numbers"),
         (lambda t: t.set_column(0, "pair", t.column("camera1")), "expected whole numbers"),
-        (lambda t: t.drop_columns(["params1"]), "params1"),
+        (lambda t: t.drop_columns(["params1"]), "expected also params1"),
+        (lambda t: t.drop_columns(["camera1"]), "expected also camera1"),
+        (lambda t: t.drop_columns(["camera1", "params1"]), "expected also camera1"),
+        (lambda t: t.drop_columns(["camera2"]), "expected also camera2"),
     ],
 )
 def test_bad_columns(change: Any, word: str) -> None:

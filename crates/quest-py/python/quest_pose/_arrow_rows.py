@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from quest_pose._core import Camera, QuestError
 
 _MODELS = {"camera1": "params1", "camera2": "params2"}
+# A column of cameras is of no use without another one.
+_NEEDS = [*_MODELS.items(), *((params, model) for model, params in _MODELS.items()), ("camera2", "camera1")]
 _COLUMNS = ["pair", "x1", "x2", *_MODELS, *_MODELS.values(), "score"]
 
 
@@ -48,10 +50,12 @@ class Rows:
         if "score" in names:
             self._score(first_points)
         self._cameras: dict[str, list[Camera | None]] = {}
-        if "camera1" in names:
-            for name in _MODELS:
-                if name in names:
-                    self._read_cameras(name)
+        for name, needed in _NEEDS:
+            if name in names and needed not in names:
+                raise QuestError(f"found the columns {names}, expected also {needed}")
+        for name in _MODELS:
+            if name in names:
+                self._read_cameras(name)
 
     def arrays(self, rows: NDArray[np.int64]) -> tuple[Any, Any, Any, dict[str, Any]]:
         """``x1, x2, offsets`` of rows that are pairs, and the options of ``estimate_batch`` that go with them."""
@@ -122,8 +126,6 @@ class Rows:
     def _read_cameras(self, name: str) -> None:
         """A camera a row; equal ones are made once."""
         parameters = _MODELS[name]
-        if parameters not in self._columns:
-            raise QuestError(f"found the columns {self._names}, expected also {parameters}")
         models, params = self._columns[name].to_pylist(), self._columns[parameters].to_pylist()
         made: dict[tuple[str, tuple[float, ...]], Camera | str] = {}
         cameras: list[Camera | None] = [None] * len(models)

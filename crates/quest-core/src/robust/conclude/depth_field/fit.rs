@@ -53,6 +53,7 @@ pub(crate) struct Fit {
 impl DepthField {
     /// Whether two are the same as far as the covariance of one tells.
     pub(crate) fn is_near(&self, other: &Fit) -> bool {
+        // In standard deviations: a mixture of two modes so near each other is hardly wider than one.
         const NEAR: f64 = 0.5;
         let turn = (self.q_21 * other.at.q_21.inverse()).scaled_axis();
         let by = self.t_21 - other.at.t_21;

@@ -24,6 +24,7 @@ impl Workspace {
 
     /// Whether a pose rests on this feature: a wrong match, whose depth nothing tells, has no say in a pose either.
     fn counts(&self, i: usize, point: &Point) -> bool {
+        // The weight of a match that is 5.3 standard deviations off.
         const HARDLY: f64 = 0.1;
         let feature = &self.features[i];
         if feature.is_used { feature.weight > HARDLY } else { point.is_mapped }
