@@ -169,6 +169,8 @@ rng = np.random.default_rng(0)
 x1, x2 = rng.uniform(0, 800, (2, 400, 2))
 K = np.array([[1000, 0, 400], [0, 1000, 400], [0, 0, 1.0]])
 options = dict(min_iterations=10**9, max_iterations=10**9)
+# A program that was begun in the background ignores the signal, and so do its children.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sent = []
 def interrupt():
     sent.append(time.monotonic())

@@ -27,6 +27,8 @@ import numpy as np
 import quest_pose as qp
 from quest_pose import paper
 
+# A program that was begun in the background ignores the signal, and so do its children.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 rng = np.random.default_rng(1)
 {setup}
 def call():
