@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 from quest_pose._core import Camera, QuestError
 
 _MODELS = {"camera1": "params1", "camera2": "params2"}
-# A column of cameras is of no use without another one.
-_NEEDS = [*_MODELS.items(), *((params, model) for model, params in _MODELS.items()), ("camera2", "camera1")]
+# A column that has no meaning without another one, and that one.
+_NEEDS = [
+    ("camera1", "params1"),
+    ("camera2", "params2"),
+    ("params1", "camera1"),
+    ("params2", "camera2"),
+    ("camera2", "camera1"),
+]
 _COLUMNS = ["pair", "x1", "x2", *_MODELS, *_MODELS.values(), "score"]
 
 

@@ -141,19 +141,7 @@ impl Bench {
         }
     }
 
-    /// How the mean image is fitted.
-    fn task(&self, image: &KeyImage, terms: &Terms<'_>) -> Task {
-        Task {
-            variance: self.noise * image.variance,
-            place_variance: self.noise * terms.task.place_variance,
-            mapped_only: true,
-            depth_variance: None,
-            iterations: 10,
-            ..terms.task
-        }
-    }
-
-    /// The same, of a scene most of which may be a plane: each feature is on it or anywhere, and the share of those on it is free.
+    /// The score of a scene most of which may be a plane: each feature is on it or anywhere, and the share of those on it is free.
     ///
     /// A box in front of a wall is such a scene. As a scene with relief it pays for the freedom of depths that are all alike, and a
     /// rotation or a wrong plane won.
@@ -223,7 +211,7 @@ impl Bench {
         sum + count.max(1.0).ln() + MIXED
     }
 
-    /// The same, of a scene with this relief.
+    /// The score of a scene with this relief.
     fn score_with(
         &mut self,
         h: &Hypothesis,
@@ -246,6 +234,18 @@ impl Bench {
         let fit = resect(points, &image.frame, &adjusted, &task, squares, scratch);
         let other = fit.map_or(f64::INFINITY, |fit| self.evidence(&fit.pose, image, &task));
         first.min(other) + prior(&adjusted, &h.map.normal, terms)
+    }
+
+    /// How the mean image is fitted.
+    fn task(&self, image: &KeyImage, terms: &Terms<'_>) -> Task {
+        Task {
+            variance: self.noise * image.variance,
+            place_variance: self.noise * terms.task.place_variance,
+            mapped_only: true,
+            depth_variance: None,
+            iterations: 10,
+            ..terms.task
+        }
     }
 
     /// What the mean image says of a pose. Leaves the squared residuals in `squares`.

@@ -11,7 +11,7 @@ use crate::{Correspondence, RelativePose};
 impl Start {
     /// The rotation that most pairs of matches agree on, fitted.
     pub(super) fn best_rotation(&mut self, sigma: f64, terms: &Terms<'_>) -> Option<Fit> {
-        // Where half of the matches are wrong one pair in four is right: so many miss it once in 10⁸ times.
+        // Where half of the matches are wrong one pair in four is right. All 64 are wrong once in 10⁸ searches.
         const PAIRS: usize = 64;
         let matches = &self.consensus.matches;
         let mut best = (f64::INFINITY, RelativePose::identity());
