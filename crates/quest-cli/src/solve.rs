@@ -47,8 +47,8 @@ Files:
      \"width\": 1024, \"height\": 768, \"params\": [1060, 1060, 514, 384]}, \"camera2\": {…},
      \"q_21\": […], \"t_21\": […]}
   JSON Lines: one such object a line.
-  CSV: one match a row, u1,v1,u2,v2[,score], in this order or under a header with these names; separated by
-    commas, semicolons, tabs or blanks.
+  CSV: one match a row, u1,v1,u2,v2[,score], in this order or under a header with these names
+    or x1,y1,x2,y2; separated by commas, semicolons, tabs or blanks.
   NumPy: .npy of N x 4 or N x 5 numbers; .npz of matches (such an array), or of x1 and x2 (N x 2 each), and of
     scores if there are any.
   Points of one image a file, CSV or .npy of N x 2: FILE --points2 FILE.

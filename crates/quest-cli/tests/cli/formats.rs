@@ -39,6 +39,35 @@ fn every_form_gives_the_same_candidates() {
 }
 
 #[test]
+fn a_header_may_have_other_names() {
+    let csv = fs::read_to_string(example("points.csv")).unwrap();
+    let (header, rows) = csv.split_once('\n').unwrap();
+    assert_eq!(header.trim(), "u1,v1,u2,v2");
+    let expected = json(&["-"], &csv);
+    for header in ["x1,y1,x2,y2", "X1,Y1,X2,Y2", "x_1,y_1,x_2,y_2", "U1,V1,U2,V2", "# x1,y1,x2,y2"] {
+        assert_eq!(json(&["-"], &format!("{header}\n{rows}")), expected, "{header}");
+    }
+    // Where both are there, ours are meant, and the others are not known.
+    let both: String = rows.lines().flat_map(|row| [row, ",9,9,9,9\n"]).collect();
+    let text = format!("u1,v1,u2,v2,x1,y1,x2,y2\n{both}");
+    assert_eq!(json(&["-"], &text), expected);
+    let run = run_in(Path::new("."), &["solve", "-"], text.as_bytes());
+    assert!(run.stderr.contains("ignored unknown keys: x1, y1, x2, y2"), "{}", run.stderr);
+    // Points of one image.
+    let points = |columns: [usize; 2], header: &str| {
+        let row = |row: &str| {
+            let fields: Vec<_> = row.split(',').collect();
+            columns.map(|k| fields[k].trim()).join(",")
+        };
+        rows.lines().fold(header.to_owned(), |all, line| all + "\n" + &row(line))
+    };
+    let folder = directory_with("1.csv", points([0, 1], "x,y"));
+    fs::write(folder.path().join("2.csv"), points([2, 3], "u,v")).unwrap();
+    let run = run_in(folder.path(), &["solve", "1.csv", "--points2", "2.csv", "--format", "json"], b"");
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&run.stdout).unwrap(), expected);
+}
+
+#[test]
 fn json_lines_give_a_line_each() {
     let lines = format!("{}\n\n{}\n", pair(", \"name\": \"a\""), pair(", \"name\": \"b\""));
     let run = run_in(Path::new("."), &["solve", "-"], lines.as_bytes());

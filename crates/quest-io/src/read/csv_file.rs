@@ -1,5 +1,7 @@
 //! CSV: one match or one point a row, under a header or without one, separated by commas, semicolons, tabs or blanks.
 //!
+//! The names of a header are `u1,v1,u2,v2` or `x1,y1,x2,y2`, of points `u,v` or `x,y`, in any case.
+//!
 //! A coordinate that is NaN, infinite or an empty field makes its match one without a bearing. Lines that begin with `#` are
 //! comments; the first one may be the header, as NumPy's `savetxt` writes it.
 
@@ -84,8 +86,8 @@ fn plain<'a, const N: usize>(text: &'a str, separator: u8, columns: &Columns<N>)
     for line in text.lines() {
         let comment = line.trim_start().strip_prefix(COMMENT);
         let names = |header: &str| {
-            let fields: Vec<_> = header.split(char::from(separator)).map(str::trim).collect();
-            columns.names.iter().all(|name| fields.contains(name))
+            let fields: Vec<_> = header.split(char::from(separator)).map(Columns::<N>::plain).collect();
+            columns.spelled(&fields).is_some()
         };
         let line = match comment {
             Some(header) if is_first && names(header) => header,
@@ -125,12 +127,14 @@ impl<const N: usize> Found<N> {
             found: header.iter().collect::<Vec<_>>().join(","),
             expected: columns.expected,
         };
+        let plain: Vec<_> = header.iter().map(Columns::<N>::plain).collect();
+        let names = columns.spelled(&plain).ok_or_else(refuse)?;
         let find = |name: &str| {
-            let mut places = header.iter().enumerate().filter(|(_, column)| *column == name).map(|(k, _)| k);
+            let mut places = plain.iter().enumerate().filter(|(_, column)| *column == name).map(|(k, _)| k);
             (places.next(), places.next())
         };
         let mut places = [0; N];
-        for (place, name) in places.iter_mut().zip(columns.names) {
+        for (place, name) in places.iter_mut().zip(names) {
             let (Some(k), None) = find(name) else { return Err(refuse()) };
             *place = k;
         }
@@ -139,8 +143,10 @@ impl<const N: usize> Found<N> {
             Some((name, (Some(k), None))) => Some((name, k)),
             _ => None,
         };
-        let is_known = |name: &str| columns.names.contains(&name) || columns.score == Some(name);
-        let unknown = header.iter().filter(|name| !is_known(name)).map(str::to_owned).collect();
+        let is_known = |k: usize| places.contains(&k) || score.is_some_and(|(_, score)| score == k);
+        let unknown =
+            header.iter().enumerate().filter(|(k, _)| !is_known(*k)).map(|(_, name)| name.to_owned());
+        let unknown = unknown.collect();
         Ok(Self { columns: places, score, unknown })
     }
 }

@@ -9,6 +9,8 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Columns<const N: usize> {
     pub(super) names: [&'static str; N],
+    /// The same by other programs' names.
+    pub(super) others: [&'static str; N],
     /// A column that may stand beside them.
     pub(super) score: Option<&'static str>,
     /// The same for messages.
@@ -16,13 +18,29 @@ pub(super) struct Columns<const N: usize> {
 }
 
 /// One match a row.
-pub(super) const MATCHES: Columns<4> =
-    Columns { names: ["u1", "v1", "u2", "v2"], score: Some("score"), expected: "u1,v1,u2,v2[,score]" };
+pub(super) const MATCHES: Columns<4> = Columns {
+    names: ["u1", "v1", "u2", "v2"],
+    others: ["x1", "y1", "x2", "y2"],
+    score: Some("score"),
+    expected: "u1,v1,u2,v2[,score]",
+};
 
 /// One point of one image a row.
-pub(super) const POINTS: Columns<2> = Columns { names: ["u", "v"], score: None, expected: "u,v" };
+pub(super) const POINTS: Columns<2> =
+    Columns { names: ["u", "v"], others: ["x", "y"], score: None, expected: "u,v" };
 
 impl<const N: usize> Columns<N> {
+    /// The spelling of the names that a header has. Capital letters and underscores make no difference: `X_1` is `x1`.
+    pub(super) fn spelled(&self, header: &[String]) -> Option<[&'static str; N]> {
+        let has = |names: &[&str; N]| names.iter().all(|name| header.iter().any(|column| column == name));
+        [self.names, self.others].into_iter().find(has)
+    }
+
+    /// A name of a header as it is compared.
+    pub(super) fn plain(name: &str) -> String {
+        name.trim().to_ascii_lowercase().replace('_', "")
+    }
+
     /// The fault of a table without names that has another number of columns.
     pub(super) fn check(&self, count: usize, fault: impl FnOnce() -> Fault) -> Result<(), Fault> {
         match (N, count) {
