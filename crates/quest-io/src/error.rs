@@ -90,6 +90,14 @@ pub enum Fault {
     /// It is not text.
     #[error("found the byte 0x{0:02x}, expected UTF-8 text")]
     NotUtf8(u8),
+    /// It is another kind of file.
+    #[error("found {found}, expected matches; {instead}")]
+    NoMatches {
+        /// What it is by its first bytes.
+        found: &'static str,
+        /// What to do with it.
+        instead: &'static str,
+    },
     /// It is not JSON, or not of the form expected.
     #[error("{0}")]
     Json(String),

@@ -8,6 +8,7 @@ mod json_words;
 mod npy_file;
 #[cfg(feature = "parquet")]
 mod parquet_file;
+mod strangers;
 mod table;
 
 use std::{
@@ -167,6 +168,9 @@ pub fn read_within(path: &Path, format: Option<Format>, most: u64) -> Result<Pai
         input = Box::new(Cursor::new(start).chain(input));
         format
     };
+    // An error of the system is said where the file is read.
+    let start = input.fill_buf().unwrap_or_default();
+    strangers::refuse(start, format).map_err(|fault| place.clone().error(fault))?;
     #[cfg(not(feature = "parquet"))]
     if format == Format::Parquet {
         return Err(place.error(Fault::NoParquet));
