@@ -45,11 +45,7 @@ pub fn read_pairs(path: &Path) -> Result<Vec<(String, String)>, ColmapError> {
 /// [`ColmapError::Pairs`] for a line that is not two names.
 pub fn parse_pairs(file: &str, text: &str) -> Result<Vec<(String, String)>, ColmapError> {
     let mut pairs = Vec::new();
-    for (line, text) in (1..).zip(text.lines()) {
-        let text = text.trim();
-        if text.is_empty() || text.starts_with('#') {
-            continue;
-        }
+    for (line, text) in named_lines(text) {
         let names: Vec<_> = text.split_whitespace().collect();
         let &[first, second] = names.as_slice() else {
             let found = format!("found {} names", names.len());
@@ -60,6 +56,32 @@ pub fn parse_pairs(file: &str, text: &str) -> Result<Vec<(String, String)>, Colm
     Ok(pairs)
 }
 
+/// The lines with names, and their numbers.
+fn named_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = (1..).zip(text.lines()).map(|(line, text)| (line, text.trim()));
+    lines.filter(|(_, text)| !text.is_empty() && !text.starts_with('#'))
+}
+
+/// What a list is called that is no file.
+const LIST: &str = "pairs";
+
+impl ColmapError {
+    /// The error of a list of pairs that was read from this file, with the file and its line in place of the list and the number of
+    /// the pair; any other error as it is.
+    #[must_use]
+    pub fn in_list(self, path: &Path) -> Self {
+        match self {
+            Self::Pairs { file, line: number, found } if file == LIST => {
+                // The list is at hand no more.
+                let text = std::fs::read_to_string(path).unwrap_or_default();
+                let line = named_lines(&text).nth(number - 1).map_or(number, |(line, _)| line);
+                Self::Pairs { file: path.display().to_string(), line, found }
+            }
+            other => other,
+        }
+    }
+}
+
 /// The keys of named pairs, each once, in ascending order.
 pub(crate) fn keys(
     pairs: &[(String, String)],
@@ -67,7 +89,7 @@ pub(crate) fn keys(
 ) -> Result<BTreeSet<PairId>, ColmapError> {
     let mut keys = BTreeSet::new();
     for (line, (first, second)) in (1..).zip(pairs) {
-        let refuse = |found| ColmapError::Pairs { file: "pairs".to_owned(), line, found };
+        let refuse = |found| ColmapError::Pairs { file: LIST.to_owned(), line, found };
         let number = |name: &String| {
             images
                 .get(name)
@@ -89,6 +111,17 @@ mod tests {
         let key = PairId::new(7, 3).unwrap();
         assert_eq!((Some(key), key.images(), key.0), (PairId::new(3, 7), (3, 7), 2_147_483_647 * 3 + 7));
         assert_eq!((PairId::new(3, 3), PairId::new(0, 3), PairId::new(1, BASE)), (None, None, None));
+    }
+
+    #[test]
+    fn an_error_of_a_list_has_its_file_and_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.txt");
+        std::fs::write(&path, "# pairs\n\na b\na c\n").unwrap();
+        let images = HashMap::from([("a".to_owned(), 1), ("b".to_owned(), 2)]);
+        let error = keys(&read_pairs(&path).unwrap(), &images).unwrap_err();
+        let said = error.in_list(&path).to_string();
+        assert!(said.contains("list.txt:4: found no image \"c\""), "{said}");
     }
 
     #[test]

@@ -68,6 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut output = Output::open(arguments.output.as_deref())?;
     let database = Database::open(&arguments.database)?;
     let pairs = arguments.pairs(&database)?;
+    if pairs.is_empty() && !arguments.quiet {
+        super::say_empty(&arguments.database);
+    }
     let shown = Shown::new(arguments.quiet);
     let exported = match arguments.what {
         What::Matches => {
@@ -141,7 +144,10 @@ impl Arguments {
 
     fn pairs(&self, database: &Database) -> Result<Vec<PairId>, Failure> {
         Ok(match &self.pairs {
-            Some(file) => database.keys_of(&read_pairs(file)?)?,
+            Some(file) => {
+                let keys = database.keys_of(&read_pairs(file)?);
+                keys.map_err(|error| super::of_list(error, Some(file)))?
+            }
             None => database.matched_pairs()?.into_iter().collect(),
         })
     }

@@ -3,16 +3,18 @@
 mod export;
 mod verify;
 
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, Subcommand};
-use quest_colmap::{VerifyOptions, Watch};
+use quest_colmap::{ColmapError, VerifyOptions, Watch};
 use quest_core::robust::Options;
 
 use crate::{
     Failure, Outcome,
     estimate_options::{Defaults, EstimateOptions},
     progress::Progress,
+    words,
 };
 
 /// Verify and export the image pairs of COLMAP databases.
@@ -32,6 +34,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match &arguments.command {
         Command::Verify(arguments) => verify::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+    }
+}
+
+/// Says why nothing was found in a database that nothing can be found in.
+fn say_empty(database: &Path) {
+    words::say(
+        "no pose",
+        &format!(
+            "{}: found no pair with matches, expected those of a matcher of COLMAP's",
+            database.display()
+        ),
+    );
+}
+
+/// An error of a list of pairs, which counts pairs, with the file and the line where the list is one.
+fn of_list(error: ColmapError, list: Option<&Path>) -> Failure {
+    match list {
+        Some(list) => error.in_list(list).into(),
+        None => error.into(),
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use quest_colmap::{
-    Database, Existing, PairReport, Report, Summary, Uncalibrated, VerifyOptions, read_pairs, verify,
+    Config, Database, Existing, PairReport, Report, Summary, Uncalibrated, VerifyOptions, read_pairs, verify,
 };
 use quest_io::Output;
 
@@ -34,10 +34,12 @@ Results:
   The threshold of 4 px is COLMAP's and gives as many points; 2 px gives purer inliers.
   With cameras whose focal length is a guess (prior_focal_length = 0) there is no pose to be had: they are
   left to COLMAP, or, with --uncalibrated guess, get a fundamental matrix that is fitted to the pixels.
+  A calibrated camera is declared by UPDATE cameras SET prior_focal_length = 1 in the database, or in pycolmap by
+  camera.has_prior_focal_length = True.
   The same seed gives the same rows, whatever the number of threads and whichever other pairs there are.
 
 Exit status:
-  0 the database was verified, 1 no pair has a pose, 2 bad input or arguments, or a database that could
+  0 the database was verified, 1 no pair has a pose or another geometry, 2 bad input or arguments, or a database that could
   not be written.";
 
 /// Verify the image pairs of a COLMAP database: inliers, models and poses into its two-view geometries.
@@ -99,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let shown = Shown::new(arguments.output.quiet);
     let report = verify(&mut database, &options, &shown);
     shown.progress.finish();
-    let report = report?;
+    let report = report.map_err(|error| super::of_list(error, arguments.pairs.as_deref()))?;
     if let (Some(file), Some(path)) = (&mut file, &arguments.report) {
         let format = extension(path);
         file.write(|writer| write(writer, &report, format))?;
@@ -108,6 +110,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     output.write(|writer| write(writer, &report, format))?;
     file.map_or(Ok(()), Output::finish)?;
     output.finish()?;
+    if report.summary.pairs == 0 {
+        super::say_empty(&arguments.database);
+    }
     let nothing = report.summary.verified == 0 && report.summary.resumed == 0;
     Ok(if nothing { Outcome::NoPose } else { Outcome::Answer })
 }
@@ -156,20 +161,38 @@ fn write(writer: &mut dyn Write, report: &Report, format: Format) -> io::Result<
     }
 }
 
+/// What becomes of cameras that nobody declared calibrated, which is pycolmap's default.
+const GUESSED: &str = "have a guessed focal length (prior_focal_length is 0), left to COLMAP
+              where the cameras are calibrated, declare it: UPDATE cameras SET prior_focal_length = 1
+              (pycolmap: camera.has_prior_focal_length = True); where not: --uncalibrated guess";
+
+/// What the pairs have that are not without: rows that are fitted to pixels hold no pose.
+fn what(summary: &Summary) -> &'static str {
+    let of_pixels = [Config::Uncalibrated, Config::PlanarOrPanoramic].map(Config::name);
+    if of_pixels.iter().any(|name| summary.configs.contains_key(name)) {
+        "with geometry"
+    } else {
+        "with a pose  "
+    }
+}
+
 fn text(summary: &Summary) -> String {
     let configs: Vec<_> = summary.configs.iter().map(|(name, count)| format!("{count} {name}")).collect();
     let mut lines = vec![
         format!("pairs         {}", summary.pairs),
         format!(
-            "with a pose   {}, {} inliers of {} matches",
-            summary.verified, summary.inliers, summary.matches
+            "{} {}, {} inliers of {} matches",
+            what(summary),
+            summary.verified,
+            summary.inliers,
+            summary.matches
         ),
         format!("without       {}", summary.rejected),
         format!("rows          {}", if configs.is_empty() { "none".to_owned() } else { configs.join(", ") }),
     ];
     for (count, what) in [
         (summary.resumed, "have a row, left as they are"),
-        (summary.uncalibrated, "have a guessed focal length, left to COLMAP (--uncalibrated guess)"),
+        (summary.uncalibrated, GUESSED),
         (summary.unreadable, "cannot be read (--report says why)"),
     ] {
         if count > 0 {
@@ -200,4 +223,20 @@ fn row(pair: &PairReport) -> Vec<String> {
         pair.model.unwrap_or_default().to_owned(),
         pair.reason.clone().unwrap_or_default(),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_pixels_are_no_poses() {
+        let of = |config: Config| {
+            let configs = [(config.name(), 5)].into();
+            text(&Summary { pairs: 6, verified: 5, configs, ..Summary::default() })
+        };
+        assert!(of(Config::Calibrated).contains("\nwith a pose   5, "));
+        assert!(of(Config::Uncalibrated).contains("\nwith geometry 5, "));
+        assert!(of(Config::PlanarOrPanoramic).contains("\nwith geometry 5, "));
+    }
 }

@@ -3,6 +3,8 @@
 
 mod bad_input;
 mod candidates;
+#[cfg(feature = "colmap")]
+mod colmap;
 mod estimate;
 #[cfg(target_os = "linux")]
 mod faults;
