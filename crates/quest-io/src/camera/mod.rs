@@ -11,12 +11,14 @@ use quest_core::{Camera, CameraError, CameraModel};
 
 pub use file::read_camera;
 
-/// The camera of COLMAP's model `name` with the parameters in COLMAP's order.
+/// The camera of COLMAP's model `name`, in capital or small letters, with the parameters in COLMAP's order.
 ///
 /// # Errors
 /// [`CameraError`] for an unknown model, and for parameters or a size that do not fit it.
 pub fn camera(name: &str, size: Option<(u32, u32)>, params: &[f64]) -> Result<Camera, CameraError> {
-    let camera = Camera::new(name.parse::<CameraModel>()?, params)?;
+    // No two models differ by the case of their letters. An error names what was given.
+    let model = name.to_ascii_uppercase().parse::<CameraModel>().or_else(|_| name.parse())?;
+    let camera = Camera::new(model, params)?;
     match size {
         Some((width, height)) => camera.with_size(width, height),
         None => Ok(camera),
