@@ -18,6 +18,7 @@ use crate::{
     input::{InputsOptions, Unread},
     options::OutputOptions,
     progress::ProgressOptions,
+    resume::{Task, Tasks},
     rows,
     tally::{Refusal, Tally},
     words,
@@ -26,6 +27,9 @@ use crate::{
 
 /// The threshold in pixels where none is given.
 const THRESHOLD: f64 = 1.0;
+
+/// A threshold in pixels below which hardly any matches agree: half the noise of the best of them, optical flow of a sharp video.
+const NARROW: f64 = 0.05;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,8 +57,10 @@ Results:
   noise the standard deviation of the inliers' errors.
   Matches that determine no pose, such as points on a line, are bad input. Among several pairs their model is
   degenerate, with a reason and without a pose. No line and no file stops the others: one that cannot be
-  read gets a record with its reason, in CSV in the last column. With -o each record is kept in FILE.part as it comes, and FILE.part becomes FILE
-  at the end; --resume goes on after the records that are there.
+  read gets a record with its reason, in CSV in the last column. With -o each record of JSON Lines is kept in FILE.part as it comes, and
+  FILE.part becomes FILE at the end. --resume needs JSON Lines: it keeps the records with a pose, tries the pairs without one again, each in its
+  place, and goes on after them. A record whose pair is not that of the input, or has another answer under these options, is an
+  error, and nothing is written; the first four poses are estimated again to see it.
   A pixel without a viewing ray is an outlier, and so is a match with a coordinate that is NaN, infinite or
   missing (null in JSON, an empty field in CSV). invalid_count tells how many there are.
   The covariance is that of the rotation vector, in radians and in the frame of camera 2, and of t.
@@ -91,7 +97,8 @@ pub(crate) struct Arguments {
     /// The number of the first pair. A part of a larger input that begins with this pair has the same answers as there.
     #[arg(long, value_name = "K", default_value_t = 0)]
     first_index: u64,
-    /// Keep the records that an earlier run wrote to -o, and go on with the pair after them.
+    /// Go on with a run that was ended: keep the poses that it wrote to -o, which is JSON Lines, and estimate the other pairs. Records of
+    /// another input, or of other options, are an error.
     #[arg(long, requires = "output")]
     resume: bool,
     #[command(flatten)]
@@ -124,9 +131,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut pairs = arguments.input.open(&arguments.output)?;
     let is_several = pairs.is_several();
     arguments.check(is_several)?;
-    let (mut writer, there) = Writer::open_long(&arguments.output, is_several, arguments.resume)?;
+    let (mut writer, earlier) = Writer::open_long(&arguments.output, is_several, arguments.resume)?;
     let progress = arguments.progress.start("pairs", None, arguments.output.quiet);
-    let mut tally = Tally::after(there);
+    let mut tally = Tally::default();
     let numbered = (arguments.first_index..).map_while(|index| {
         let pair = pairs.next().transpose()?;
         // The key of the file seeds the search, where it has one.
@@ -138,17 +145,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     });
     let done = in_order(
         arguments.threads,
-        numbered.skip(there),
-        |(index, pair): (u64, Result<Pair, Result<Unread, ReadError>>)| match pair {
-            Ok(pair) => one_pair(arguments, index, pair, is_several),
-            Err(Ok(unread)) => Ok(Estimated::unreadable(index, unread)),
-            Err(Err(error)) => Err(error.into()),
-        },
-        |estimated: Result<Estimated, Failure>| {
-            let Estimated { heading, record, focal_length, refusal } = estimated?;
-            writer.write(&heading, record, focal_length)?;
-            tally.count(refusal);
-            progress.add(1);
+        Tasks::new(numbered, earlier),
+        |task| carry_out(arguments, task, is_several),
+        |done: Result<Done, Failure>| {
+            match done? {
+                Done::Estimated(estimated) => {
+                    let Estimated { heading, record, focal_length, refusal } = *estimated;
+                    writer.write(&heading, record, focal_length)?;
+                    tally.count(refusal);
+                    progress.add(1);
+                }
+                Done::Kept(line) => {
+                    writer.keep(&line)?;
+                    tally.count(None);
+                }
+                Done::Settled => writer.settle()?,
+            }
             Ok::<_, Failure>(())
         },
     );
@@ -161,6 +173,33 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     done?;
     tally.outcome()
+}
+
+/// What became of a task.
+enum Done {
+    Estimated(Box<Estimated>),
+    /// The line of a record of an earlier run.
+    Kept(Vec<u8>),
+    /// All of its records are this run's own.
+    Settled,
+}
+
+fn carry_out(arguments: &Arguments, task: Task, is_several: bool) -> Result<Done, Failure> {
+    let estimated = match task {
+        Task::Estimate(numbered) => match *numbered {
+            (index, Ok(pair)) => one_pair(arguments, index, pair, is_several)?,
+            (index, Err(Ok(unread))) => Estimated::unreadable(index, unread),
+            (_, Err(Err(error))) => return Err(error.into()),
+        },
+        Task::Keep(line) => return Ok(Done::Kept(line)),
+        Task::Compare(comparison) => {
+            let again = |index, pair| Ok(one_pair(arguments, index, pair, is_several)?.record);
+            return comparison.kept(again).map(Done::Kept);
+        }
+        Task::Settle => return Ok(Done::Settled),
+        Task::Refuse(failure) => return Err(failure),
+    };
+    Ok(Done::Estimated(Box::new(estimated)))
 }
 
 impl Estimated {
@@ -182,6 +221,17 @@ impl Arguments {
             }
             (None, Some(threshold)) => Ok(self.search.options(threshold, index)),
             (None, None) => Err(pair.place.clone().error(Fault::NoThreshold)),
+        }
+    }
+
+    /// What to say where no pose was found and the threshold is likely in another unit than the pixels that it is taken for.
+    fn narrow(&self, pair: &Pair, error: &EstimateError) -> String {
+        match (error, self.search.threshold, &pair.cameras) {
+            (EstimateError::NoPose { .. }, Some(threshold), Some(_)) if threshold < NARROW => format!(
+                "; the threshold of {threshold} is less than the noise of nearly all matches: with cameras it is in pixels, \
+                 without them in units of the plane z = 1"
+            ),
+            _ => String::new(),
         }
     }
 
@@ -233,13 +283,16 @@ fn one_pair(
             return Err(pair.refuse(error).into());
         }
         Err(error) => {
-            (EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms), Some(error.to_string()))
+            let record = EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms);
+            let reason = format!("{error}{}", arguments.narrow(&pair, &error));
+            (EstimateRecord { reason: Some(reason.clone()), ..record }, Some(reason))
         }
     };
     let record = EstimateRecord { key: index, match_count, invalid_count: usable.invalid.len(), ..record };
     let name = pair.name.clone().unwrap_or_else(|| pair.place.to_string());
     let heading = words::one_line(&format!("{name}: {match_count} matches{}", summary(&record)));
-    let refusal = reason.map(|reason| Refusal::NoPose(format!("{}: {reason}", pair.place)));
+    let why = reason.as_deref().map(words::after_no_pose);
+    let refusal = why.map(|why| Refusal::NoPose(format!("{}: {why}", pair.place)));
     Ok(Estimated { heading, record, focal_length: pair.focal_length(), refusal })
 }
 

@@ -18,6 +18,7 @@ mod parquet;
 mod plot;
 mod polynomials;
 mod progress;
+mod resume;
 mod rows;
 mod servo;
 mod shell;

@@ -9,7 +9,7 @@ use quest_core::{
     feasibility::Feasibility,
     solver::{Kinds, SolverName},
 };
-use quest_io::{Output, WriteError};
+use quest_io::{Earlier, Output, WriteError};
 
 use crate::Failure;
 
@@ -37,7 +37,8 @@ pub(crate) fn input_format_parser() -> impl clap::builder::TypedValueParser<Valu
 /// Where a result goes, and how.
 #[derive(Args, Debug)]
 pub(crate) struct OutputOptions {
-    /// How the result is written [default: after the extension of -o, else as the input, else a table].
+    /// How the result is written [default: by the extension of -o where it is .json, .jsonl, .ndjson or .csv, else a table; of several
+    /// pairs JSON Lines].
     #[arg(long, value_enum, hide_default_value = true)]
     format: Option<Format>,
     /// Write the result to this file, whole or not at all.
@@ -102,14 +103,15 @@ impl OutputOptions {
         Output::open(self.output.as_deref().map(Path::new))
     }
 
-    /// The target of a long run, found writable, and how many lines of an earlier run it holds.
-    pub(crate) fn open_growing(&self, resume: bool) -> Result<(Output, usize), WriteError> {
+    /// The target of a long run, found writable, and the lines of an earlier run that it holds.
+    pub(crate) fn open_growing(&self, resume: bool) -> Result<(Output, Option<Earlier>), WriteError> {
         Output::growing(self.output.as_deref().map(Path::new), resume)
     }
 }
 
 /// `MODEL,width,height,params…` as a camera, or the camera in `FILE` or `FILE:ID`.
 pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
+    const FORM: &str = "MODEL,width,height,params such as PINHOLE,1024,768,1060,1060,514,384";
     const EXPECTED: &str = "expected MODEL,width,height,params such as PINHOLE,1024,768,1060,1060,514,384";
     let of_file =
         |path: &str, id| quest_io::read_camera(Path::new(path), id).map_err(|error| error.to_string());
@@ -120,7 +122,7 @@ pub(crate) fn parse_camera(text: &str) -> Result<Camera, String> {
         return of_file(path, Some(id));
     }
     if !text.contains(',') {
-        return Err(format!("found no such file, {EXPECTED}, or the file of a camera"));
+        return Err(format!("found no file of this name, expected the file of a camera, or {FORM}"));
     }
     let mut parts = text.split(',').map(str::trim);
     let (Some(model), Some(width), Some(height)) = (parts.next(), parts.next(), parts.next()) else {

@@ -10,6 +10,11 @@ pub(crate) fn say(kind: &str, text: &str) {
     let _ = writeln!(io::stderr().lock(), "{kind}: {}", one_line(text));
 }
 
+/// Why there is no pose, for a line that begins by saying so.
+pub(crate) fn after_no_pose(reason: &str) -> &str {
+    reason.strip_prefix("no pose could be found: ").unwrap_or(reason)
+}
+
 /// The text on one line of bounded length, with visible control characters.
 pub(crate) fn one_line(text: &str) -> String {
     let mut line = String::new();

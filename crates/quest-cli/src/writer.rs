@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use quest_io::{EstimateRecord, Output, WriteError};
+use quest_io::{Earlier, EstimateRecord, Output, WriteError};
 use serde::Serialize;
 
 use crate::{
@@ -45,12 +45,12 @@ impl<R: Record> Writer<R> {
     }
 
     /// As [`open`](Self::open), for a long run of poses, also into a table of Parquet: lines of JSON go to a file as they come. With
-    /// `resume` the lines of an earlier run stay; how many there are is returned.
+    /// `resume` also the lines of an earlier run, if there was one; until [`settle`](Self::settle) what it left stays as it is.
     pub(crate) fn open_long(
         options: &OutputOptions,
         is_lines: bool,
         resume: bool,
-    ) -> Result<(Self, usize), Failure> {
+    ) -> Result<(Self, Option<Earlier>), Failure> {
         let format = options.format(if is_lines { Format::Jsonl } else { Format::Table });
         if format != Format::Jsonl || !is_lines || options.is_parquet() {
             if resume {
@@ -60,13 +60,27 @@ impl<R: Record> Writer<R> {
                 return Err(Failure::Arguments(message));
             }
             let Some(file) = options.file().filter(|_| options.is_parquet()) else {
-                return Ok((Self::open(options, is_lines)?, 0));
+                return Ok((Self::open(options, is_lines)?, None));
             };
             let poses = Some(parquet::made(PosesTable::new(), file)?);
-            return Ok((Self { output: options.open_any()?, format, pairs: 0, kept: Vec::new(), poses }, 0));
+            return Ok((
+                Self { output: options.open_any()?, format, pairs: 0, kept: Vec::new(), poses },
+                None,
+            ));
         }
-        let (output, pairs) = options.open_growing(resume)?;
-        Ok((Self { output, format, pairs, kept: Vec::new(), poses: None }, pairs))
+        let (output, earlier) = options.open_growing(resume)?;
+        Ok((Self { output, format, pairs: 0, kept: Vec::new(), poses: None }, earlier))
+    }
+
+    /// Keeps a line of an earlier run as it is.
+    pub(crate) fn keep(&mut self, line: &[u8]) -> Result<(), WriteError> {
+        self.pairs += 1;
+        self.output.write(|w| w.write_all(line))
+    }
+
+    /// The lines of the earlier run are this run's own: from here on what is written stays where the run is ended.
+    pub(crate) fn settle(&mut self) -> Result<(), WriteError> {
+        self.output.settle()
     }
 
     pub(crate) fn write(

@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod camera;
+mod earlier;
 mod error;
 mod estimate_record;
 mod json_text;
@@ -32,6 +33,7 @@ mod read;
 mod record;
 
 pub use camera::{camera, read_camera};
+pub use earlier::Earlier;
 pub use error::{Fault, Place, ReadError};
 pub use estimate_record::{
     EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord, ThirdViewRecord,

@@ -8,7 +8,7 @@ use std::{
 
 use tempfile::{Builder, NamedTempFile};
 
-use crate::error::plain;
+use crate::{earlier::Earlier, error::plain};
 
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +45,8 @@ enum Target {
     File { path: PathBuf, text: Vec<u8> },
     /// Written into `part` as it comes, which is then renamed.
     Growing { path: PathBuf, part: PathBuf, file: File },
+    /// Written into another file, which becomes `part` where [`Output::settle`] is called.
+    Resuming { path: PathBuf, part: PathBuf, file: NamedTempFile },
 }
 
 impl Output {
@@ -66,27 +68,48 @@ impl Output {
     }
 
     /// As [`Output::open`], for runs that may be ended: what is written to a file goes at once into another one beside it, with
-    /// `.part` at the end of its name, which takes the file's place in [`Output::finish`]. With `resume` it begins with the whole
-    /// lines of an earlier run: those of the part where there is one, else those of the file. Returns also how many there are.
+    /// `.part` at the end of its name, which takes the file's place in [`Output::finish`].
+    ///
+    /// With `resume` also the lines of an earlier run: those of the part where there is one, else those of the file. `None` where
+    /// neither is there, or the target is no file. What is written then is kept apart until [`Output::settle`]: without that call
+    /// neither file changes.
     ///
     /// # Errors
     /// A path that cannot be written to, or lines that cannot be read.
-    pub fn growing(path: Option<&Path>, resume: bool) -> Result<(Self, usize), WriteError> {
+    pub fn growing(path: Option<&Path>, resume: bool) -> Result<(Self, Option<Earlier>), WriteError> {
         let output = Self::open(path)?;
-        let Target::File { path, .. } = output.target else { return Ok((output, 0)) };
+        let Target::File { path, .. } = output.target else { return Ok((output, None)) };
         let mut part = path.clone().into_os_string();
         part.push(".part");
         let part = PathBuf::from(part);
         let grow = || {
-            let kept = if resume { lines(&part, &path)? } else { Vec::new() };
-            let mut file = new_file(directory(&path))?;
-            file.write_all(&kept)?;
-            let file = file.persist(&part)?;
-            // Every one of the lines ends.
-            Ok((file, kept.split(|&byte| byte == b'\n').count() - 1))
+            let earlier = if resume { Earlier::open(&output.name, &part, &path)? } else { None };
+            let file = new_file(directory(&path))?;
+            Ok(match earlier {
+                Some(earlier) => (Target::Resuming { path, part, file }, Some(earlier)),
+                None => (Target::Growing { file: file.persist(&part)?, path, part }, None),
+            })
         };
-        let (file, count) = grow().map_err(|source| WriteError { target: output.name.clone(), source })?;
-        Ok((Self { name: output.name, target: Target::Growing { path, part, file } }, count))
+        let (target, earlier) =
+            grow().map_err(|source| WriteError { target: output.name.clone(), source })?;
+        Ok((Self { name: output.name, target }, earlier))
+    }
+
+    /// Makes what was written so far the part of a run that goes on, once the lines of the earlier run are found to be its own.
+    ///
+    /// # Errors
+    /// The error of the target, with its name.
+    pub fn settle(&mut self) -> Result<(), WriteError> {
+        let target = std::mem::replace(&mut self.target, Target::Stdout);
+        let (target, settled) = match target {
+            Target::Resuming { path, part, file } => match file.persist(&part) {
+                Ok(file) => (Target::Growing { path, part, file }, Ok(())),
+                Err(error) => (Target::Resuming { path, part, file: error.file }, Err(error.error)),
+            },
+            other => (other, Ok(())),
+        };
+        self.target = target;
+        settled.map_err(|source| WriteError { target: self.name.clone(), source })
     }
 
     /// Runs `write` on the target.
@@ -97,12 +120,14 @@ impl Output {
         let result = match &mut self.target {
             Target::Stdout => write(&mut io::stdout().lock()),
             Target::Special(file) | Target::Growing { file, .. } => write(file),
+            Target::Resuming { file, .. } => write(file),
             Target::File { text, .. } => write(text),
         };
         result.map_err(|source| WriteError { target: self.name.clone(), source })
     }
 
-    /// Puts the result in its place. Without this call a file stays as it was.
+    /// Puts the result in its place. Without this call a file stays as it was, and so it does where a run that goes on did not
+    /// [`settle`](Self::settle).
     ///
     /// # Errors
     /// The error of the target, with its name. A file is then as it was before.
@@ -112,6 +137,8 @@ impl Output {
             Target::Special(mut file) => file.flush(),
             Target::File { path, text } => replace(&path, &text),
             Target::Growing { path, part, file } => grown(&path, &part, &file),
+            // What the earlier run left stays as it is.
+            Target::Resuming { .. } => Ok(()),
         };
         result.map_err(|source| WriteError { target: self.name, source })
     }
@@ -154,23 +181,6 @@ fn led_to(path: &Path) -> io::Result<PathBuf> {
 
 fn directory(path: &Path) -> &Path {
     path.parent().filter(|d| !d.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// The whole lines of the first of these files that is there; none where neither is.
-fn lines(part: &Path, path: &Path) -> io::Result<Vec<u8>> {
-    for file in [part, path] {
-        match fs::read(file) {
-            Ok(mut text) => {
-                // A run that was killed may have ended within a line.
-                let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-                text.truncate(whole);
-                return Ok(text);
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(Vec::new())
 }
 
 fn grown(path: &Path, part: &Path, file: &File) -> io::Result<()> {

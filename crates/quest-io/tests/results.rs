@@ -251,9 +251,20 @@ fn links_stay_links_and_devices_stay_devices() {
         io::Read::read_exact(&mut both, &mut text).unwrap();
         assert_eq!(&text, b"one");
     }
-    let (mut null, count) = Output::growing(Some(Path::new("/dev/null")), true).unwrap();
+    let (mut null, earlier) = Output::growing(Some(Path::new("/dev/null")), true).unwrap();
     write(&mut null, "nothing");
-    assert_eq!(count, 0);
+    assert!(earlier.is_none());
+}
+
+/// The output of a run that goes on, with the lines of the earlier one, and how many they are.
+fn resumed(path: &Path) -> (Output, usize) {
+    let (mut output, earlier) = Output::growing(Some(path), true).unwrap();
+    let lines: Vec<_> = earlier.unwrap().map(Result::unwrap).collect();
+    for (index, (place, line)) in lines.iter().enumerate() {
+        assert_eq!(place.line, Some(index + 1));
+        write(&mut output, str::from_utf8(line).unwrap());
+    }
+    (output, lines.len())
 }
 
 #[test]
@@ -262,28 +273,37 @@ fn a_run_that_is_ended_goes_on_where_it_was() {
     let path = folder.path().join("a.jsonl");
     let part = folder.path().join("a.jsonl.part");
     fs::write(&path, "old 1\nold 2\nhal").unwrap();
-    let (mut output, count) = Output::growing(Some(&path), true).unwrap();
+    let (mut output, count) = resumed(&path);
     assert_eq!(count, 2);
     write(&mut output, "3\n");
+    // Before the lines are found to be its own nothing changes.
+    assert!(!part.exists());
+    output.settle().unwrap();
+    write(&mut output, "4\n");
     drop(output);
-    assert_eq!(fs::read_to_string(&part).unwrap(), "old 1\nold 2\n3\n");
+    assert_eq!(fs::read_to_string(&part).unwrap(), "old 1\nold 2\n3\n4\n");
     assert_eq!(fs::read_to_string(&path).unwrap(), "old 1\nold 2\nhal");
     // The part comes before the file.
-    let (mut output, count) = Output::growing(Some(&path), true).unwrap();
-    assert_eq!(count, 3);
-    write(&mut output, "4\n");
+    let (mut output, count) = resumed(&path);
+    assert_eq!(count, 4);
+    write(&mut output, "5\n");
+    output.finish().unwrap();
+    assert_eq!(fs::read_to_string(&part).unwrap(), "old 1\nold 2\n3\n4\n");
+    assert_eq!(fs::read_to_string(&path).unwrap(), "old 1\nold 2\nhal");
+    let (mut output, _) = resumed(&path);
+    output.settle().unwrap();
     output.finish().unwrap();
     assert_eq!(fs::read_to_string(&path).unwrap(), "old 1\nold 2\n3\n4\n");
     assert_eq!(names(folder.path()), ["a.jsonl"]);
     // Without being asked to go on it begins anew.
-    let (mut output, count) = Output::growing(Some(&path), false).unwrap();
+    let (mut output, earlier) = Output::growing(Some(&path), false).unwrap();
     write(&mut output, "new\n");
     output.finish().unwrap();
-    assert_eq!((count, fs::read_to_string(&path).unwrap()), (0, "new\n".to_owned()));
-    let (_, count) = Output::growing(Some(&folder.path().join("none")), true).unwrap();
-    assert_eq!(count, 0);
-    let (_, count) = Output::growing(None, true).unwrap();
-    assert_eq!(count, 0);
+    assert_eq!((earlier.is_none(), fs::read_to_string(&path).unwrap()), (true, "new\n".to_owned()));
+    let (_, earlier) = Output::growing(Some(&folder.path().join("none")), true).unwrap();
+    assert!(earlier.is_none());
+    let (_, earlier) = Output::growing(None, true).unwrap();
+    assert!(earlier.is_none());
     // A part that is there and cannot be read is not begun anew.
     #[cfg(unix)]
     {

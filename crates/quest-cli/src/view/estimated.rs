@@ -27,7 +27,8 @@ pub(super) fn text(pair: &Pair, options: &Options, is_ply: bool) -> Result<Optio
         Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
         Err(EstimateError::Input(error)) => return Err(pair.refuse(error).into()),
         Err(error) => {
-            words::say("no pose", &format!("{}: {error}", pair.place));
+            let reason = error.to_string();
+            words::say("no pose", &format!("{}: {}", pair.place, words::after_no_pose(&reason)));
             return Ok(None);
         }
     };

@@ -132,6 +132,30 @@ fn text_that_is_not_utf8() {
 }
 
 #[test]
+fn other_kinds_of_files_are_called_by_what_they_are() {
+    let image = "estimate reads matches, not images; see the guide Pose from photographs";
+    refused(
+        "a.png",
+        b"\x89PNG\r\n\x1a\n\0\0",
+        &format!("a.png: found a PNG image, expected matches; {image}"),
+    );
+    refused("a.csv", b"\xff\xd8\xff\xe0", &format!("a.csv: found a JPEG image, expected matches; {image}"));
+    let colmap = "COLMAP's: quest-cli colmap verify or quest-cli colmap export";
+    let expected = format!("a.db: found an SQLite database, expected matches; {colmap}");
+    refused("a.db", b"SQLite format 3\0\x10\0", &expected);
+    for (start, found) in [
+        (&b"\x1f\x8b\x08"[..], "a gzip archive"),
+        (b"PK\x03\x04", "a zip archive"),
+        (b"\x7fELF", "a program"),
+    ] {
+        let directory = directory_with("a.jsonl", start);
+        let run = run_in(directory.path(), &["estimate", "a.jsonl"], b"");
+        assert!(run.stderr.starts_with(&format!("error: a.jsonl: found {found}")), "{}", run.stderr);
+        assert_eq!(run.status, 2);
+    }
+}
+
+#[test]
 fn points_without_a_bearing() {
     let far = "matches[1]: a coordinate in view 2 is 1e9 on the plane z = 1, expected at most 6.7e7";
     refused("a.json", r#"{"matches": [[1, 2, 3, 4], [1, 2, 1e9, 4]]}"#, &format!("a.json: {far}"));
@@ -141,6 +165,21 @@ fn points_without_a_bearing() {
 fn names_of_files_cannot_break_the_line() {
     let run = run(&["solve", "a\nb.json"]);
     assert_eq!(run.stderr, "error: a\\nb.json: cannot be read: No such file or directory\n");
+}
+
+#[test]
+fn cameras_of_the_command_line() {
+    let file = example("tumfr3_98072_98172.json");
+    let given = |camera: &str| run(&["solve", &file, "--camera1", camera]);
+    let upper = given("PINHOLE,640,480,535.4,539.2,320.1,247.6");
+    let lower = given("pinhole,640,480,535.4,539.2,320.1,247.6");
+    assert_eq!((lower.status, &lower.stdout), (upper.status, &upper.stdout), "{}", lower.stderr);
+    assert!(given("fish,640,480,5").stderr.contains("unknown camera model \"fish\""));
+    let missing = given("camera.yml").stderr;
+    assert!(
+        missing.contains("found no file of this name, expected the file of a camera, or MODEL,"),
+        "{missing}"
+    );
 }
 
 #[test]

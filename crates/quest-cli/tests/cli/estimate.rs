@@ -91,10 +91,27 @@ fn false_matches_have_no_pose() {
     false_ones["matches"] = all.iter().step_by(3).cloned().collect();
     let (run, result) = estimated(&false_ones, &["--max-iterations", "2000"]);
     assert_eq!((run.status, &result["model"]), (1, &Value::Null));
-    assert!(run.stderr.starts_with("no pose: standard input: no pose could be found"), "{}", run.stderr);
+    assert!(run.stderr.starts_with("no pose: standard input: the best one agrees with "), "{}", run.stderr);
     assert!(result["reason"].as_str().unwrap().contains("of 40 matches"));
     let (run, _) = estimated(&false_ones, &["--max-iterations", "2000", "--max-false-alarms", "inf"]);
     assert_eq!(run.status, 0);
+}
+
+#[test]
+fn a_threshold_in_another_unit_is_named() {
+    let all = pair([0.5, 0.1, -0.2], 60, true);
+    let unit =
+        "the threshold of 0.0001 is less than the noise of nearly all matches: with cameras it is in pixels";
+    let mut noisy = all.clone();
+    for (k, row) in noisy["matches"].as_array_mut().unwrap().iter_mut().enumerate() {
+        row[3] = json!(row[3].as_f64().unwrap() + 0.3 * (7.0 * k as f64).sin());
+    }
+    let (run, result) = estimated(&noisy, &["--threshold", "0.0001"]);
+    assert_eq!(run.status, 1, "{}", run.stdout);
+    assert!(run.stderr.contains(unit) && result["reason"].as_str().unwrap().contains(unit), "{}", run.stderr);
+    // Not where it is right, and not where there are too few right matches.
+    let (run, _) = estimated(&all, &["--threshold", "0.0001", "--max-false-alarms", "inf"]);
+    assert!(!run.stderr.contains(unit), "{}", run.stderr);
 }
 
 #[test]

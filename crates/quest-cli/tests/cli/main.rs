@@ -18,6 +18,7 @@ mod output;
 mod polynomials;
 mod readme;
 mod replay;
+mod resume;
 mod servo;
 mod shell;
 mod simulate;

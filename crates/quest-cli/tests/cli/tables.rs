@@ -170,7 +170,7 @@ fn a_camera_may_be_a_file() {
             "cameras.txt",
             "cameras.txt: found 2 cameras with the numbers 1, 2, expected FILE:ID with one of them",
         ),
-        ("no.yml", "found no such file, expected MODEL,width,height,params"),
+        ("no.yml", "found no file of this name, expected the file of a camera, or MODEL,width,height,params"),
         ("FISH,640,480,1,1,1", "unknown camera model \"FISH\""),
     ] {
         let run = run_in(folder.path(), &["solve", "a.npy", "--camera1", camera], b"");
