@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::words;
 
 /// Nothing is shown before.
-const PATIENCE: Duration = Duration::from_secs(1);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(1);
 
 /// From one line to the next.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);

@@ -13,14 +13,15 @@ use serde::Serialize;
 use crate::{
     Failure, Outcome,
     options::{Format, OutputOptions},
-    rows, table,
+    progress::PATIENCE,
+    rows, table, words,
 };
 
 const EXAMPLES: &str = "\
 The time is that of one solve on this machine, the shortest of many measurements. A solve computes the
 real solutions as poses, with their scale and rank. The 100 scenes are realistic (coplanar for
 homography), with 0.75 px of noise and as few matches as the solver needs. Other load on the machine
-makes the time longer.
+makes the time longer. All of it takes some seconds.
 
 quest-literal and relinearization-literal are the paper's two algorithms as it prints them, on dense
 matrices: for comparing with the paper. The others find the same solutions faster, and those that
@@ -56,8 +57,14 @@ struct SolverRecord {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // Ahead of the measurements: a target that cannot be written is known at once.
     let mut output = arguments.output.open()?;
+    let is_silent = arguments.no_times || arguments.output.quiet;
+    let (start, mut is_said) = (Instant::now(), is_silent);
     let record = |solver: SolverName| -> Result<_, SceneError> {
         let info = solver.info();
+        if !is_said && start.elapsed() > PATIENCE {
+            is_said = true;
+            words::say("note", "measuring how long each solver takes; --no-times leaves that out");
+        }
         Ok(SolverRecord {
             name: info.name,
             min_matches: info.min_matches,

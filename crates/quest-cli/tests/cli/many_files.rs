@@ -107,6 +107,26 @@ fn what_stands_for_no_file_is_an_error() {
 }
 
 #[test]
+fn what_the_call_lacks_is_said_once_with_its_count() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..4 {
+        fs::copy(example("points.csv"), folder.path().join(format!("{number}.csv"))).unwrap();
+    }
+    let why =
+        "found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1";
+    let run = run_in(folder.path(), &["estimate", ".", "--quiet"], b"");
+    let expected = format!(
+        "no pose: ./0.csv: {why}\nerror: none of the 4 pairs can be read, all for the reason above\n"
+    );
+    assert_eq!((run.status, run.stderr), (2, expected));
+    // The others are counted where one pair has an answer.
+    let some = [&example("tumfr3_98072_98172.json"), ".", "--quiet"];
+    let run = run_in(folder.path(), &[&["estimate"], &some[..]].concat(), b"");
+    let expected = format!("no pose: ./0.csv: {why}\nno pose: 3 more for the same reason: {why}\n");
+    assert_eq!((run.status, run.stderr, run.stdout.lines().count()), (1, expected, 5));
+}
+
+#[test]
 fn a_pair_without_a_scale_costs_itself_alone() {
     let folder = folder();
     let files = [example("tumfr3_98072_98172.json"), "a.csv".to_owned()];

@@ -210,3 +210,25 @@ fn a_reader_that_leaves_a_long_table_is_no_error() {
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
 }
+
+#[test]
+fn a_name_without_a_known_extension_gets_what_the_help_says() {
+    let help = run(&["estimate", "--help"]).stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(help.contains("else a table; of several pairs JSON Lines"), "{help}");
+    let pair = example("tumfr3_98072_98172.json");
+    let folder = tempfile::tempdir().unwrap();
+    let written = |files: &[&str]| {
+        let run = run_in(folder.path(), &[&["estimate", "-o", "e.txt", "--quiet"], files].concat(), b"");
+        assert_eq!(run.status, 0, "{}", run.stderr);
+        fs::read_to_string(folder.path().join("e.txt")).unwrap()
+    };
+    assert!(written(&[&pair]).starts_with("tumfr3_98072_98172: 500 matches"));
+    assert!(written(&[&pair, &pair]).starts_with("{\"name\":"));
+}
+
+#[test]
+fn solvers_say_nothing_where_they_measure_nothing() {
+    for more in [&["--no-times"][..], &["--quiet"]] {
+        assert_eq!(run(&[&["solvers"], more].concat()).stderr, "", "{more:?}");
+    }
+}
