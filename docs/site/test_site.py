@@ -63,6 +63,9 @@ def test_images_have_a_description():
         ("second pose", "guides/planes"),
         ("COLMAP", "guides/colmap"),
         ("quaternion order", "guides/conventions"),
+        ("BibTeX", "index"),
+        ("resume", "guides/batches"),
+        ("ambiguous", "guides/planes"),
     ],
 )
 def test_a_reader_finds(words, page):
