@@ -69,6 +69,11 @@ impl<R: Record> Writer<R> {
             ));
         }
         let (output, earlier) = options.open_growing(resume)?;
+        if resume && !output.is_file() {
+            let message =
+                "found --resume and an output that is no file, expected -o with the file of the earlier run";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
         Ok((Self { output, format, pairs: 0, kept: Vec::new(), poses: None }, earlier))
     }
 

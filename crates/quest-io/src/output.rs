@@ -112,6 +112,12 @@ impl Output {
         settled.map_err(|source| WriteError { target: self.name.clone(), source })
     }
 
+    /// Whether the target is a file, in whose place the whole result is put.
+    #[must_use]
+    pub fn is_file(&self) -> bool {
+        !matches!(self.target, Target::Stdout | Target::Special(_))
+    }
+
     /// Runs `write` on the target.
     ///
     /// # Errors

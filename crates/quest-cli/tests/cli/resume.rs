@@ -132,6 +132,15 @@ fn a_line_that_is_repaired_may_have_a_name() {
 }
 
 #[test]
+fn nothing_goes_on_in_what_is_no_file() {
+    let folder = folder();
+    let arguments = [&["estimate", "p*.csv", "-o", "-", "--resume"], &OPTIONS[..]].concat();
+    let run = run_in(folder.path(), &arguments, b"");
+    assert_eq!((run.status, run.stdout.as_str()), (2, ""));
+    assert!(run.stderr.starts_with("error: found --resume and an output that is no file"), "{}", run.stderr);
+}
+
+#[test]
 fn the_help_says_what_it_needs() {
     let help = run(&["estimate", "--help"]).stdout;
     assert!(help.contains("--resume needs JSON Lines"), "{help}");
