@@ -1,6 +1,8 @@
 //! What an estimate can be told.
 
-use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::lanes::SearchScore;
 use crate::robust::data::observations::Observations;
@@ -123,15 +125,26 @@ pub struct KnownDirection {
     pub in_view1: Vector3<f64>,
     /// In the frame of camera 2; the same as in view 1 for the axis of the rotation.
     pub in_view2: Vector3<f64>,
-    /// A pose that turns the first direction further than this from the second, in radians, is not considered.
+    /// A pose that turns the first direction further than this from the second, in radians from 0 to π, is neither the answer nor the
+    /// runner-up.
     pub tolerance: f64,
 }
 
 impl KnownDirection {
     /// Whether a rotation takes the direction from view 1 to view 2.
-    pub(super) fn allows(&self, q_21: &nalgebra::UnitQuaternion<f64>) -> bool {
+    pub(super) fn allows(&self, q_21: &UnitQuaternion<f64>) -> bool {
+        self.off(q_21) <= self.tolerance
+    }
+
+    /// How far from its place in view 2 a rotation takes the direction, in radians.
+    fn off(&self, q_21: &UnitQuaternion<f64>) -> f64 {
         let turned = q_21 * self.in_view1;
-        turned.cross(&self.in_view2).norm().atan2(turned.dot(&self.in_view2)) <= self.tolerance
+        turned.cross(&self.in_view2).norm().atan2(turned.dot(&self.in_view2))
+    }
+
+    /// The error of matches whose best pose it does not allow, if they have one.
+    pub(super) fn refuse(&self, q_21: Option<&UnitQuaternion<f64>>) -> EstimateError {
+        EstimateError::Direction { off: q_21.map(|q_21| self.off(q_21)), tolerance: self.tolerance }
     }
 }
 
@@ -162,6 +175,14 @@ pub enum EstimateError {
         /// The share of false matches that agree with it as well; see [`Estimate::false_share`](crate::robust::Estimate).
         false_share: f64,
     },
+    /// No pose that the matches agree with turns the [known direction](KnownDirection) to where it was told to be.
+    #[error("{}", describe_direction(*off, *tolerance))]
+    Direction {
+        /// How far from there the best pose turns it, in radians, if there is one.
+        off: Option<f64>,
+        /// What is allowed, in radians.
+        tolerance: f64,
+    },
     /// The caller ended the search.
     #[error("the search was ended before it had an answer")]
     Cancelled,
@@ -183,6 +204,14 @@ fn describe_no_pose(inliers: usize, matches: usize, false_share: f64) -> String 
          without them in units of the plane z = 1",
         100.0 * false_share
     )
+}
+
+fn describe_direction(off: Option<f64>, tolerance: f64) -> String {
+    let text = format!(
+        "no pose could be found that turns the known direction to within {:.3} degrees of where it is in view 2",
+        tolerance.to_degrees()
+    );
+    off.map_or(text.clone(), |off| format!("{text}: the best one misses it by {:.3}", off.to_degrees()))
 }
 
 impl Priors<'_> {
@@ -209,12 +238,8 @@ impl Priors<'_> {
                     return refuse("length of the known direction", length, "a positive finite number");
                 }
             }
-            if tolerance.is_nan() || tolerance < 0.0 {
-                return refuse(
-                    "tolerance of the known direction",
-                    tolerance,
-                    "a number that is not negative",
-                );
+            if !(0.0..=PI).contains(&tolerance) {
+                return refuse("tolerance of the known direction", tolerance, "radians from 0 to π");
             }
         }
         Ok(())

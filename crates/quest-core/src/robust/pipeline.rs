@@ -89,7 +89,10 @@ impl Task<'_> {
         if is_cancelled() {
             return Err(EstimateError::Cancelled);
         }
-        let found = found.ok_or_else(|| no_pose(&observations, 0, 0.0))?;
+        let found = found.ok_or_else(|| match priors.direction {
+            Some(direction) => direction.refuse(None),
+            None => no_pose(&observations, 0, 0.0),
+        })?;
         let Some((keypoints, order)) = shared else {
             return conclude::conclude(&mut poses, &found, None, answer, options.max_false_alarms, &mut rng);
         };

@@ -353,6 +353,61 @@ fn a_known_direction_excludes_poses() {
     assert!(with(wrong).is_err());
 }
 
+/// A direction that both cameras know, as a rotation turns it, off by an angle.
+fn known(q_21: &UnitQuaternion<f64>, off: f64) -> KnownDirection {
+    let axis = Vector3::new(0.2, 1.0, -0.1);
+    let in_view2 = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), off) * (q_21 * axis);
+    KnownDirection { in_view1: axis, in_view2, tolerance: 0.02 }
+}
+
+#[test]
+fn no_answer_turns_a_known_direction_further_than_told() {
+    let planar = SceneOptions { layout: Layout::Coplanar, ..noisy(100) };
+    let small = SceneOptions { motion: SceneMotion::Parallax(0.01), ..noisy(200) };
+    let (mut right, mut other, mut swapped) = (0, 0, 0);
+    for (kind, index) in [&planar, &noisy(100), &small].into_iter().flat_map(|k| (0..40).map(move |i| (k, i)))
+    {
+        let (scene, _) = scene(kind, 0.2, 4_000 + index);
+        let with = |direction: KnownDirection| {
+            let priors = Priors { direction: Some(direction), ..Priors::default() };
+            let found =
+                estimate_with(&scene.matches, &Options { max_iterations: 1_000, ..options() }, &priors);
+            if let Ok(found) = &found {
+                let second = found.runner_up.as_ref().map(|second| second.pose.q_21);
+                for q_21 in [Some(found.pose.q_21), second].into_iter().flatten() {
+                    assert!(
+                        (q_21 * direction.in_view1).angle(&direction.in_view2) <= direction.tolerance + 1e-9
+                    );
+                }
+            }
+            found
+        };
+        let found = with(known(&scene.truth.q_21, 0.0));
+        if let Err(error) = &found {
+            println!("{index} {:?} {:?}: {error}", kind.layout, kind.motion);
+        }
+        right += usize::from(found.is_ok_and(|f| f.pose.rotation_error(&scene.truth).to_degrees() < 1.0));
+        // Nine degrees off there may be no pose, but no other one either.
+        if let Err(error) = with(known(&scene.truth.q_21, 0.16)) {
+            assert!(
+                matches!(error, EstimateError::Direction { .. } | EstimateError::NoPose { .. }),
+                "{error}"
+            );
+        }
+        // The other motion of a plane is the answer where it alone turns the direction so.
+        let free = estimate(&scene.matches, &options()).unwrap();
+        if let Some(second) = free.runner_up.filter(|s| s.pose.rotation_error(&free.pose).to_degrees() > 4.0)
+        {
+            other += 1;
+            let found = with(known(&second.pose.q_21, 0.0));
+            swapped +=
+                usize::from(found.is_ok_and(|f| f.pose.rotation_error(&second.pose).to_degrees() < 2.0));
+        }
+    }
+    println!("right {right} of 120, the other motion {swapped} of {other}");
+    assert!(right >= 114 && other >= 10 && 10 * swapped >= 9 * other, "{right}, {swapped} of {other}");
+}
+
 #[test]
 fn bad_input_is_refused_at_the_door() {
     let (scene, _) = scene(&noisy(20), 0.0, 130);

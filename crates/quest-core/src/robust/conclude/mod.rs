@@ -30,6 +30,7 @@ use crate::robust::conclude::false_alarms::Chance;
 use crate::robust::conclude::final_refinement::{Polished, polish};
 use crate::robust::conclude::model::choose;
 use crate::robust::conclude::report::{Conclusion, report};
+use crate::robust::conclude::small_motion::SmallMotion;
 use crate::robust::data::columns::Columns;
 use crate::robust::data::observations::Observations;
 use crate::robust::estimate::{Estimate, Model};
@@ -38,6 +39,7 @@ use crate::robust::search::SearchResult;
 use crate::robust::search::pose_score::PoseScorer;
 use crate::robust::search::search_score::MANY;
 use crate::robust::{DIAGNOSED, MIN_MATCHES, degenerate, no_pose};
+use crate::solver::shared::motion::Motion;
 use crate::{Degeneracy, InputError};
 
 /// Steps 3 to 6: the estimate that the result of the search leads to. `blind` are the matches of the search where they are others:
@@ -55,6 +57,7 @@ pub(crate) fn conclude(
     let plane = plane::fit(observations, &polished, rng);
     let others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     let polished = better_of(poses, polished, &others);
+    let polished = turn_as_known(poses, polished, found, others.iter().map(|other| *other.motion()));
     let false_matches = false_alarms::false_matches(observations);
     let polished = refine_without_chance(poses, polished, &false_matches);
     let false_share = Chance::new(&false_matches, polished.motion()).share(poses.threshold());
@@ -63,7 +66,12 @@ pub(crate) fn conclude(
     if inliers < MIN_MATCHES || log_alarms > max_false_alarms.log10() {
         return Err(no_pose(observations, inliers, false_share));
     }
-    let (polished, small) = small_motion::look(poses, polished, &others);
+    let (polished, mut small) = small_motion::look(poses, polished, &others);
+    if let Some(small) = &mut small {
+        small.modes.retain(|mode| found.allows(&mode.at.q_21));
+    }
+    let likeliest = small.as_ref().and_then(SmallMotion::likeliest);
+    let polished = turn_as_known(poses, polished, found, likeliest);
     let verdict = choose(observations, &polished, plane.as_ref(), small.as_ref());
     let over_all = plane
         .filter(|_| verdict.model == Model::Planar)
@@ -84,8 +92,38 @@ pub(crate) fn conclude(
         false_share,
     };
     // A whole family of poses is no pose, and none is known where the rotation may be any.
-    report(poses, found, conclusion, answer)
-        .ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))
+    let estimate = report(poses, found, conclusion, answer)
+        .ok_or_else(|| degenerate(observations, InputError::Degenerate(Degeneracy::RankDeficient).into()))?;
+    match found.direction {
+        Some(direction) if !direction.allows(&estimate.pose.q_21) => {
+            Err(direction.refuse(Some(&estimate.pose.q_21)))
+        }
+        _ => Ok(estimate),
+    }
+}
+
+/// The pose, or the best of the others that turn the known direction as told, where the pose does not. Of a plane the refinement may
+/// lead from one motion to the other, so they count as they are too.
+fn turn_as_known(
+    poses: &mut PoseScorer,
+    polished: Polished,
+    found: &SearchResult,
+    others: impl IntoIterator<Item = Motion>,
+) -> Polished {
+    if found.allows(&polished.motion().q_21) {
+        return polished;
+    }
+    let mut best: Option<Polished> = None;
+    for other in others {
+        let itself = poses.score(other, poses.threshold());
+        for other in [polish(poses, other), polished.clone().with_pose(itself, poses.threshold())] {
+            let is_better = best.as_ref().is_none_or(|best| other.pose.scored.cost < best.pose.scored.cost);
+            if is_better && found.allows(&other.motion().q_21) {
+                best = Some(other);
+            }
+        }
+    }
+    best.unwrap_or(polished)
 }
 
 /// The base ten logarithm of the number of false alarms. With few matches chance cannot be told from truth: the best pose is taken

@@ -60,7 +60,7 @@ pub(crate) fn report(
     answer: Answer,
 ) -> Option<Estimate> {
     let observations = poses.observations;
-    let (motion, second) = chosen(answer, answers(poses, found, &conclusion));
+    let (motion, second) = chosen(answer, allowed(found, answers(poses, found, &conclusion)));
     let Conclusion { mut polished, small, plane, verdict, false_matches, false_share, .. } = conclusion;
     let (model, sigma, is_best) = (verdict.model, polished.sigma, matches!(answer, Answer::Best));
     polished.pose = poses.score(motion, poses.threshold());
@@ -105,6 +105,7 @@ pub(crate) fn report(
         (Some(_), Model::Planar) => farther(&pose, [Some(motion), second]),
         _ => second,
     };
+    let second = second.filter(|second| found.allows(&second.q_21));
     Some(Estimate {
         model,
         pose,
@@ -216,6 +217,14 @@ fn answers(
         second = second_of_few(&found.of_few, &motion);
     }
     (motion, second)
+}
+
+/// Of the answers those that turn the known direction as told; the first also where neither does.
+fn allowed(found: &SearchResult, (motion, second): (Motion, Option<Motion>)) -> (Motion, Option<Motion>) {
+    match second.filter(|second| found.allows(&second.q_21)) {
+        Some(second) if !found.allows(&motion.q_21) => (second, None),
+        second => (motion, second),
+    }
 }
 
 /// The motion of a camera that only turns: the direction of what translation is left.

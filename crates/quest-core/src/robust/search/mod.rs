@@ -19,7 +19,7 @@ mod useful;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, UnitQuaternion};
 use rand_chacha::ChaCha8Rng;
 
 use crate::robust::data::observations::Observations;
@@ -96,6 +96,15 @@ pub(crate) struct SearchResult {
     pub(crate) iterations: usize,
     /// As how many uniform samples they count where chance is judged.
     pub(crate) tries: usize,
+    /// The direction that both cameras know.
+    pub(crate) direction: Option<KnownDirection>,
+}
+
+impl SearchResult {
+    /// Whether a rotation takes the direction that both cameras know from one to the other.
+    pub(crate) fn allows(&self, q_21: &UnitQuaternion<f64>) -> bool {
+        self.direction.is_none_or(|direction| direction.allows(q_21))
+    }
 }
 
 /// What decides which samples are drawn.
@@ -220,8 +229,8 @@ impl<'a> Search<'a> {
 
     /// What was found, `None` where there is no pose, and the scorer of poses for what follows.
     pub(crate) fn into_result(self) -> (PoseScorer<'a>, Option<SearchResult>) {
-        let Self { poses, best, all, iterations, tries, .. } = self;
-        (poses, best.map(|best| SearchResult { best, of_few: all, iterations, tries }))
+        let Self { poses, best, all, iterations, tries, direction, .. } = self;
+        (poses, best.map(|best| SearchResult { best, of_few: all, iterations, tries, direction }))
     }
 
     /// Looks at every sample, which costs little where there are few matches.
@@ -332,11 +341,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Refines a pose, and keeps it where it is better.
+    /// Refines a pose, and keeps it where it is better and allowed.
     pub(crate) fn consider_pose(&mut self, motion: Motion) {
         let pose = self.poses.score(motion, self.width());
         let optimised = self.optimise(pose);
-        self.keep(optimised);
+        if self.allows(&optimised) {
+            self.keep(optimised);
+        }
     }
 
     /// Whether a pose agrees with the direction that is known.
