@@ -1,11 +1,13 @@
 //! What the controller remembers from one image to the next.
 
+use nalgebra::Vector3;
+
 use crate::RelativePose;
 use crate::servo::controller::rig::Rig;
 use crate::servo::controller::safety::Safety;
 use crate::servo::controller::state::State;
-use crate::servo::controller::watchdog::Watchdog;
-use crate::servo::estimators::estimate::{HoldReason, Motion};
+use crate::servo::controller::watchdog::{LEAST, Watchdog};
+use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion};
 use crate::servo::twist::{Limits, Twist};
 
 #[derive(Clone, Debug)]
@@ -23,6 +25,9 @@ pub(crate) struct Memory {
     /// How long the camera has been at the goal.
     at_goal_seconds: f64,
     pub(crate) watchdog: Watchdog,
+    /// The same of the angle alone, where nothing else is known.
+    turning: Watchdog,
+    pub(crate) contradictions: Contradictions,
     pub(crate) exploration: Exploration,
 }
 
@@ -38,6 +43,8 @@ impl Default for Memory {
             arrived: false,
             at_goal_seconds: 0.0,
             watchdog: Watchdog::default(),
+            turning: Watchdog::default(),
+            contradictions: Contradictions::default(),
             exploration: Exploration::default(),
         }
     }
@@ -106,6 +113,26 @@ impl Memory {
         }
     }
 
+    /// Whether the angle to the goal does not fall although the camera is told to turn, where it only turns.
+    pub(crate) fn turns_away(&mut self, state: State, estimate: &Estimate, motion: &Motion) -> bool {
+        let square = (state == State::RotationOnly).then(|| estimate.pose.q_21.angle().powi(2));
+        let variance = estimate.covariance.map_or(0.0, |c| (0..3).map(|k| c[(k, k)]).sum());
+        let turn = Motion { linear: Vector3::zeros(), ..*motion };
+        let turns_away = self.turning.is_diverging(square, 1.0, variance, &turn);
+        self.watchdog.found += usize::from(turns_away) * Contradictions::COUNT;
+        turns_away
+    }
+
+    /// Whether the camera was seen again and again not to go where it is sent.
+    pub(crate) fn is_contradicted(&mut self) -> bool {
+        let is = self.contradictions.in_a_row >= Contradictions::MOST;
+        if is {
+            self.contradictions.in_a_row = 1;
+            self.watchdog.found += Contradictions::COUNT;
+        }
+        is
+    }
+
     /// Counts the time at the goal.
     pub(crate) fn has_arrived(
         &mut self,
@@ -121,6 +148,51 @@ impl Memory {
             && pose.q_21.angle() <= arrival.angle;
         self.at_goal_seconds = if is_there { self.at_goal_seconds + seconds } else { 0.0 };
         self.arrived = is_there && self.at_goal_seconds >= arrival.seconds;
+    }
+}
+
+/// How often the estimator has begun anew because the motion contradicted it, without a pose that the motion confirmed in between. An
+/// estimator may be wrong once. One that is wrong again and again sees a robot that does not do what it is told.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Contradictions {
+    in_a_row: u8,
+    /// The restarts of the estimator that have been counted.
+    restarts: usize,
+    /// Images followed at full speed since the last one.
+    tracked: usize,
+}
+
+impl Contradictions {
+    /// So many images at full speed are no chance.
+    const ENOUGH: usize = 15;
+    /// So many in a row are a divergence, and count as two.
+    const MOST: u8 = 4;
+    const COUNT: usize = 2;
+
+    /// Counts what the estimator did at this image, unless the goal is so near that noise may contradict the motion.
+    pub(crate) fn count(&mut self, restarts: usize, state: State, potential: Option<f64>) {
+        if !potential.is_some_and(|value| value > LEAST) {
+            self.expect(restarts);
+        }
+        if restarts > self.restarts {
+            (self.restarts, self.tracked) = (restarts, 0);
+            self.in_a_row = self.in_a_row.saturating_add(1);
+        }
+        self.tracked += usize::from(state == State::Tracking);
+        if self.tracked >= Self::ENOUGH {
+            self.in_a_row = 0;
+        }
+    }
+
+    /// The estimator has begun anew for another reason.
+    pub(crate) fn expect(&mut self, restarts: usize) {
+        self.restarts = restarts;
+    }
+
+    /// The share of its speed that a camera is trusted with until the motion confirms the pose: each contradiction halves it, so that
+    /// a camera that goes astray does not go far.
+    pub(crate) fn trust(self) -> f64 {
+        0.5_f64.powi(i32::from(self.in_a_row.min(Self::MOST)))
     }
 }
 
@@ -175,7 +247,6 @@ impl Exploration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     #[test]
     fn an_exploration_is_as_fast_whatever_the_length_of_its_direction() {

@@ -176,8 +176,13 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         let begin = self.estimator.begin().map(|begin| self.rig.mount.pose_for_law(&begin, self.rig.unit));
         let scale = begin.and_then(|begin| self.potential(&begin)).unwrap_or(1.0);
         let variance = estimate.covariance.map_or(0.0, |c| c.trace());
-        if self.safety.watchdog && self.memory.watchdog.is_diverging(potential, scale, variance, &motion) {
-            self.estimator.restart();
+        self.memory.contradictions.count(self.estimator.restarts(), state, potential);
+        if self.safety.watchdog
+            && (self.memory.watchdog.is_diverging(potential, scale, variance, &motion)
+                || self.memory.turns_away(state, estimate, &motion)
+                || self.memory.is_contradicted())
+        {
+            self.restart();
             return self.hold(features, HoldReason::Diverging, seconds);
         }
         let (wanted, border_limits) = self.guarded(wanted, features, state);
@@ -196,13 +201,19 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
             {
                 (state, wanted) = (State::Exploring, self.rig.mount.carry(&twist));
             } else if self.memory.exploration.take_end() {
-                self.estimator.restart();
+                self.restart();
             }
         }
         let command = self.memory.accelerated(&wanted, &self.safety, seconds);
         self.memory.has_arrived(state, &pose, &self.rig, &self.safety, seconds);
         self.memory.held(None, seconds);
         self.finish(features, command, &Ok(*estimate), state, border_limits)
+    }
+
+    /// The estimator begins anew, by no fault of its own.
+    fn restart(&mut self) {
+        self.estimator.restart();
+        self.memory.contradictions.expect(self.estimator.restarts());
     }
 
     /// The command for an image without a pose: the last command, or one closer to zero.
@@ -260,8 +271,8 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         };
         let mut twist = self.safety.limits.apply(&twist);
         let share = match state {
-            State::Ambiguous => AMBIGUOUS_SPEED,
-            State::Confirming => CONFIRMING_SPEED,
+            State::Ambiguous => AMBIGUOUS_SPEED * self.memory.contradictions.trust(),
+            State::Confirming => CONFIRMING_SPEED * self.memory.contradictions.trust(),
             _ => 1.0,
         };
         (twist.linear, twist.angular) = (twist.linear * share, twist.angular * share);

@@ -139,7 +139,9 @@ impl Display for Advice<'_> {
 /// What helps against a reason to hold.
 fn help(reason: HoldReason) -> &'static str {
     match reason {
-        HoldReason::Starting => "This takes about one to two seconds at 10 Hz.",
+        HoldReason::Starting => {
+            "This takes about one to two seconds at 10 Hz, and longer where the features disagree by more than `noise` says."
+        }
         HoldReason::TooFewFeatures => {
             "Bring the goal's features into view, or take a goal image with more of them."
         }
@@ -148,7 +150,7 @@ fn help(reason: HoldReason) -> &'static str {
         HoldReason::Jump => "Check the period and the limits that were given.",
         HoldReason::Uncertain => "Use more features, spread over the image.",
         HoldReason::Diverging => {
-            "The motion did not bring the goal nearer: check the axes of the camera and the sign of the commands."
+            "The motion did not bring the goal nearer: check the axes of the camera, the sign of the commands and the unit."
         }
         HoldReason::Stale => "Send images with rising stamps, not older than the limit.",
     }

@@ -20,7 +20,7 @@ const SHARE: f64 = 0.3;
 const FALLEN: f64 = 0.9;
 /// Below this V noise decides, and there is no judgement: 6 cm with features at a metre, or 3.5°. With 0.02 the judgement came 14
 /// cm too late.
-const LEAST: f64 = 0.004;
+pub(crate) const LEAST: f64 = 0.004;
 
 /// A window of images, and what was found.
 #[derive(Clone, Copy, Debug, Default)]
