@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "W,X,Y,Z,TX,TY,TZ", allow_hyphen_values = true, value_parser = parse_pose)]
     initial_pose: Option<RelativePose>,
     /// A direction that both cameras know, such as gravity, or the axis about which a robot turns, which is the same in both. Poses
-    /// that turn one further than DEG degrees from the other are not considered.
+    /// that turn one further than DEG degrees from the other are neither the answer nor the second pose.
     #[arg(long, value_name = "X1,Y1,Z1[,X2,Y2,Z2],DEG", allow_hyphen_values = true, value_parser = parse_direction)]
     known_direction: Option<KnownDirection>,
     /// The matches of view 1 with a third view. Where two poses are possible, the one that agrees with them is taken.

@@ -211,6 +211,9 @@ impl Input<'_> {
         if pair.looks_like_pixels() {
             return Err(pair.place.error(Fault::Pixels));
         }
+        if pair.looks_like_image_points() {
+            return Err(pair.place.error(Fault::PointsOfThePlane));
+        }
         Ok(Some(pair))
     }
 

@@ -114,6 +114,7 @@ pub mod camera;
 pub mod candidate;
 #[doc = include_str!("../CONVENTIONS.md")]
 pub mod conventions {}
+pub mod coordinates;
 pub mod correspondence;
 mod degeneracy;
 pub mod disambiguation;

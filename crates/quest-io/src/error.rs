@@ -175,6 +175,12 @@ pub enum Fault {
         "these look like pixels: give --camera1 (points of the plane z = 1 that are so far out: --camera1 SIMPLE_PINHOLE,1,1,1,0,0)"
     )]
     Pixels,
+    /// Points of the plane `z = 1`, and a camera.
+    #[error(
+        "all matches lie within 2 pixels of the corner of the image, expected pixels: points that are on the plane z = 1 already are \
+         given without a camera"
+    )]
+    PointsOfThePlane,
     /// An estimate without a camera does not know what noise is.
     #[error(
         "found no camera and no --threshold, expected a camera, or a threshold in units of the plane z = 1"

@@ -1,6 +1,7 @@
 //! An image pair: cameras, matches, and the other data that a file has about them.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use quest_core::coordinates::{look_like_image_points, look_like_pixels};
 use quest_core::correspondence::Usable;
 use quest_core::{Camera, Correspondence, InputError, MatchError, RelativePose};
 
@@ -94,10 +95,13 @@ impl Pair {
     /// Whether there is no camera, and most matches are farther from the axis than a camera sees on the plane `z = 1`.
     #[must_use]
     pub fn looks_like_pixels(&self) -> bool {
-        /// A point there is 84 degrees off the axis.
-        const FAR: f64 = 10.0;
-        let far = self.matches.iter().filter(|row| row.iter().any(|x| x.abs() > FAR)).count();
-        self.cameras.is_none() && 2 * far > self.matches.len()
+        self.cameras.is_none() && look_like_pixels(&self.matches)
+    }
+
+    /// Whether there are cameras, and all matches are where no image's features are but points of the plane `z = 1`.
+    #[must_use]
+    pub fn looks_like_image_points(&self) -> bool {
+        self.cameras.is_some_and(|cameras| cameras.iter().all(|c| look_like_image_points(&self.matches, c)))
     }
 
     /// The mean focal length of the two cameras in pixels, `None` without cameras.

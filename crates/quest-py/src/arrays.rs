@@ -65,9 +65,9 @@ pub(crate) fn rows<const D: usize>(name: &str, given: &Bound<'_, PyAny>) -> PyRe
     Real::new(name, given, &format!("real numbers of shape (N, {D})"))?.rows()
 }
 
-/// The 3 x 3 matrix of the argument `name`.
-pub(crate) fn matrix3(name: &str, given: &Bound<'_, PyAny>) -> PyResult<[[f64; 3]; 3]> {
-    let array = Real::new(name, given, "a Camera or a matrix K of shape (3, 3)")?;
+/// The 3 x 3 matrix of the argument `name`, where `expected` says what is.
+pub(crate) fn matrix3(name: &str, given: &Bound<'_, PyAny>, expected: &str) -> PyResult<[[f64; 3]; 3]> {
+    let array = Real::new(name, given, expected)?;
     array.rows()?.try_into().map_err(|_| array.mismatch())
 }
 

@@ -65,7 +65,7 @@ pub(crate) fn from_argument(name: &str, given: &Bound<'_, PyAny>) -> PyResult<qu
 }
 
 pub(crate) fn from_k(name: &str, k: &Bound<'_, PyAny>) -> PyResult<quest_core::Camera> {
-    let rows = arrays::matrix3(name, k)?;
+    let rows = arrays::matrix3(name, k, "a Camera or a matrix K of shape (3, 3)")?;
     // nalgebra keeps columns, NumPy rows.
     let k = Matrix3::from(rows).transpose();
     quest_core::Camera::from_k(&k).map_err(|error| errors::camera(name, &error))

@@ -76,7 +76,7 @@ fn of_input(error: &InputError, message: String) -> PyErr {
 pub(crate) fn estimate(error: &EstimateError) -> PyErr {
     match error {
         EstimateError::Input(error) => input(error),
-        EstimateError::NoPose { .. } => NoPose::new_err(error.to_string()),
+        EstimateError::NoPose { .. } | EstimateError::Direction { .. } => NoPose::new_err(error.to_string()),
         _ => QuestError::new_err(error.to_string()),
     }
 }

@@ -29,7 +29,8 @@ use crate::{arrays, options};
 ///     A rotation and a translation to begin with.
 /// known_direction : (array_like of shape (3,), array_like of shape (3,), float), optional
 ///     A direction in space in the frame of camera 1 and in that of camera 2, such as gravity or (twice the same) the
-///     axis of the rotation, and how far a pose may turn one from the other, in radians.
+///     axis of the rotation, and how far a pose may turn one from the other, in radians from 0 to π. Neither the answer nor the
+///     second pose turns it further.
 /// invalid : {"outlier", "pair", "raise"}
 ///     What a match without a bearing is: a NaN, or a pixel for which a camera has no viewing ray. An outlier, which the
 ///     result counts; or no match of a pair that has a pose (``NoAnswer``); or the error that it is for ``solve``.
@@ -83,6 +84,7 @@ pub(crate) fn estimate(
 ) -> PyResult<Py<Estimate>> {
     let invalid: Invalid = invalid.parse()?;
     let views = Views::new(x1, x2, camera1, camera2)?;
+    views.refuse_other_units()?;
     let scores = scores.map(|scores| arrays::vector("scores", scores)).transpose()?;
     let pose = initial_pose.as_ref().map(|given| pose("initial_pose", given)).transpose()?;
     let direction = known_direction.as_ref().map(direction).transpose()?;
@@ -157,9 +159,7 @@ pub(crate) fn pose(name: &str, (r, t): &(Bound<'_, PyAny>, Bound<'_, PyAny>)) ->
 
 /// The rotation of the matrix `name`.
 pub(crate) fn rotation(name: &str, r: &Bound<'_, PyAny>) -> PyResult<UnitQuaternion<f64>> {
-    let rows: [[f64; 3]; 3] = arrays::rows(name, r)?.try_into().map_err(|rows: Vec<[f64; 3]>| {
-        ShapeMismatch::new_err(format!("{name} has {} rows, expected a matrix of shape (3, 3)", rows.len()))
-    })?;
+    let rows = arrays::matrix3(name, r, "a rotation matrix of shape (3, 3)")?;
     // nalgebra keeps columns, NumPy rows.
     let matrix = nalgebra::Matrix3::from(rows).transpose();
     let is_rotation = (matrix * matrix.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-6

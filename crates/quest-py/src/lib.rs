@@ -7,6 +7,7 @@ mod camera;
 mod candidate;
 mod choose;
 mod colmap;
+mod coordinates;
 mod errors;
 mod estimate;
 mod estimate_batch;

@@ -10,6 +10,7 @@ use quest_core::{Camera, Candidates, Correspondence, InputError, correspondence,
 use crate::arrays::{self, Points};
 use crate::camera;
 use crate::candidate::Candidate;
+use crate::coordinates;
 use crate::errors::{self, BadCamera, QuestError, ShapeMismatch};
 use crate::supervisor::apart;
 
@@ -81,6 +82,7 @@ pub(crate) fn solve(
         feasibility.parse().map_err(|error: UnknownFeasibility| QuestError::new_err(error.to_string()))?;
     let kinds: Kinds = kinds.parse().map_err(|error: UnknownKinds| QuestError::new_err(error.to_string()))?;
     let views = Views::new(x1, x2, camera1, camera2)?;
+    views.refuse_other_units()?;
     let is_long = views.given() > LONG;
     let solved = move || {
         let matches = views.matches()?;
@@ -171,8 +173,9 @@ impl Views {
         match (arrays::points("x1", x1)?, arrays::points("x2", x2)?) {
             (Points::Image(x1), Points::Image(x2)) => match (camera1, camera2) {
                 (None, None) => Ok(Self::Image(x1, x2)),
-                (Some(camera1), None) => Ok(Self::Pixels([camera1, camera1].into(), x1, x2)),
-                (Some(camera1), Some(camera2)) => Ok(Self::Pixels([camera1, camera2].into(), x1, x2)),
+                (Some(camera1), camera2) => {
+                    Ok(Self::Pixels([camera1, camera2.unwrap_or(camera1)].into(), x1, x2))
+                }
                 (None, Some(_)) => Err(BadCamera::new_err("camera2 is given without camera1, expected both")),
             },
             (Points::Bearings(x1), Points::Bearings(x2)) => match (camera1, camera2) {
@@ -186,6 +189,21 @@ impl Views {
                 x1.columns(),
                 x2.columns()
             ))),
+        }
+    }
+
+    /// Refuses coordinates that are probably of another unit.
+    pub(crate) fn refuse_other_units(&self) -> PyResult<()> {
+        match self {
+            Self::Image(x1, x2) => {
+                coordinates::on_plane("x1", x1)?;
+                coordinates::on_plane("x2", x2)
+            }
+            Self::Pixels(cameras, u1, u2) => {
+                coordinates::in_pixels("x1", u1, &cameras[0])?;
+                coordinates::in_pixels("x2", u2, &cameras[1])
+            }
+            Self::Bearings(..) => Ok(()),
         }
     }
 

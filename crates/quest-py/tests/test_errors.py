@@ -31,7 +31,7 @@ CASES: list[tuple[Callable[[], object], type[Exception], list[str]]] = [
     (lambda: qp.constraint_matrix(X1[:2], X2[:2]), qp.TooFewMatches, ["2", "3"]),
     (lambda: qp.solve(with_value(np.nan), X2), qp.NotFinite, ["match 3", "view 1", "NaN", "finite"]),
     (lambda: qp.solve(X2, with_value(-np.inf)), qp.NotFinite, ["match 3", "view 2", "-inf"]),
-    (lambda: qp.solve(with_value(np.nan), X2, K), qp.NotFinite, ["match 3", "view 1", "NaN"]),
+    (lambda: qp.solve(with_value(np.nan), SCENE.u2, K), qp.NotFinite, ["match 3", "view 1", "NaN"]),
     (lambda: qp.solve(np.ma.masked_less(X1, 0), X2), qp.NotFinite, ["x1", "masked", POINTS]),
     (lambda: qp.solve(X1, X2[:4]), qp.ShapeMismatch, ["view 1", "5", "view 2", "4"]),
     (lambda: qp.solve(X1.T, X2.T), qp.ShapeMismatch, ["x1", "(2, 5)", POINTS]),
@@ -74,7 +74,7 @@ CASES: list[tuple[Callable[[], object], type[Exception], list[str]]] = [
     (lambda: qp.Camera.from_k(K).bearing(K), qp.ShapeMismatch, ["pixels", "(3, 3)", "(N, 2)"]),
     (lambda: qp.Camera.from_k(K).project([[0, 0, 1], [0, 0, -1]]), qp.BadCamera, ["point 1", "-1"]),
     (lambda: BARREL.bearing([[1e6, 0]]), qp.BadCamera, ["pixel 0"]),
-    (lambda: qp.solve(1e6 * X1, X2, BARREL), qp.BadCamera, ["match 0", "view 1"]),
+    (lambda: qp.solve(1e6 * X1, SCENE.u2, BARREL), qp.BadCamera, ["match 0", "view 1"]),
 ]
 
 @pytest.mark.parametrize(("call", "error", "words"), CASES)

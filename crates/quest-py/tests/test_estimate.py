@@ -104,6 +104,43 @@ def test_priors() -> None:
     assert rotation_error(est.R, scene.R) < 0.5
 
 
+def test_a_known_direction_holds_for_the_answer() -> None:
+    scene = make_scene(1, 200)
+    u1, u2, _ = with_outliers(scene, 0.3, 2)
+    down = np.array([0.0, 1.0, 0.0])
+    c, s = np.cos(0.15), np.sin(0.15)
+    wrong = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) @ scene.R @ down
+    with pytest.raises(qp.NoPose, match="known direction to within 1.146 degrees|no pose"):
+        qp.estimate(u1, u2, K, known_direction=(down, wrong, 0.02))
+    with pytest.raises(qp.QuestError, match="radians from 0 to π"):
+        qp.estimate(u1, u2, K, known_direction=(down, scene.R @ down, 20.0))
+
+
+def test_coordinates_of_the_wrong_unit_are_refused() -> None:
+    scene = make_scene(1, 30)
+    limits = {"max_speed": 0.1, "max_turn_rate": 0.3}
+    for call in [
+        lambda: qp.estimate(scene.u1, scene.u2, threshold=1.0),
+        lambda: qp.solve(scene.u1, scene.u2),
+        lambda: qp.servo.CameraServo(scene.u1, **limits, noise=0.5),
+    ]:
+        with pytest.raises(qp.BadCamera, match="looks like pixels and no camera is given"):
+            call()
+    for call in [
+        lambda: qp.estimate(scene.x1, scene.x2, K),
+        lambda: qp.solve(scene.x1, scene.x2, K),
+        lambda: qp.servo.CameraServo(scene.x1, K, **limits, noise=0.5),
+    ]:
+        with pytest.raises(qp.QuestError, match="within 2 pixels of the corner"):
+            call()
+
+
+def test_a_quaternion_is_no_rotation_matrix() -> None:
+    scene = make_scene(1, 30)
+    with pytest.raises(qp.ShapeMismatch, match=r"shape \(4,\), expected a rotation matrix of shape \(3, 3\)"):
+        qp.estimate(scene.u1, scene.u2, K, initial_pose=(np.array([1.0, 0, 0, 0]), scene.t))
+
+
 def test_false_matches() -> None:
     rng = np.random.default_rng(7)
     with pytest.raises(qp.NoPose, match="of 60 matches"):

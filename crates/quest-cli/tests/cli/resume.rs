@@ -74,7 +74,7 @@ fn records_of_other_pairs_are_refused() {
 fn records_of_other_options_are_refused() {
     let folder = folder();
     assert_eq!(estimate(&folder, "p[012].csv", &[]).status, 0);
-    let camera = ["--camera1", "SIMPLE_PINHOLE,640,480,500,0,0"];
+    let camera = ["--camera1", "SIMPLE_PINHOLE,640,480,15,0,0"];
     for more in [&["--threshold", "3e-3"][..], &["--min-iterations", "500"], &camera] {
         // The last of an option twice would be an error: the first ones are left out.
         let arguments = [&["estimate", "p*.csv", "-o", "out.jsonl", "--quiet", "--resume"], more].concat();

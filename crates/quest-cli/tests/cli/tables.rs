@@ -193,4 +193,11 @@ fn pixels_without_a_camera_are_told_from_points_of_the_plane() {
         let run = run_in(folder.path(), &["solve", "a.npy", "--camera1", camera], b"");
         assert_eq!(run.status, 0, "{}", run.stderr);
     }
+    // Nor are points of the plane taken for pixels.
+    let points: Vec<f64> = rows().iter().flatten().copied().collect();
+    fs::write(folder.path().join("b.npy"), array(&[5, 4], &points)).unwrap();
+    let run =
+        run_in(folder.path(), &["solve", "b.npy", "--camera1", "SIMPLE_PINHOLE,640,640,500,320,320"], b"");
+    let words = "within 2 pixels of the corner of the image";
+    assert!(run.status == 2 && run.stderr.contains(words), "{}", run.stderr);
 }

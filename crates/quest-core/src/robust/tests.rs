@@ -383,9 +383,6 @@ fn no_answer_turns_a_known_direction_further_than_told() {
             found
         };
         let found = with(known(&scene.truth.q_21, 0.0));
-        if let Err(error) = &found {
-            println!("{index} {:?} {:?}: {error}", kind.layout, kind.motion);
-        }
         right += usize::from(found.is_ok_and(|f| f.pose.rotation_error(&scene.truth).to_degrees() < 1.0));
         // Nine degrees off there may be no pose, but no other one either.
         if let Err(error) = with(known(&scene.truth.q_21, 0.16)) {
@@ -404,7 +401,6 @@ fn no_answer_turns_a_known_direction_further_than_told() {
                 usize::from(found.is_ok_and(|f| f.pose.rotation_error(&second.pose).to_degrees() < 2.0));
         }
     }
-    println!("right {right} of 120, the other motion {swapped} of {other}");
     assert!(right >= 114 && other >= 10 && 10 * swapped >= 9 * other, "{right}, {swapped} of {other}");
 }
 

@@ -15,7 +15,7 @@ use quest_core::solver::SolverName;
 use super::command::Command;
 use super::controller::AnyLoop;
 use crate::errors::{NotFinite, QuestError, ShapeMismatch, TooFewMatches};
-use crate::{arrays, camera};
+use crate::{arrays, camera, coordinates};
 
 /// The arguments of both controllers.
 pub(super) struct Given<'a, 'py> {
@@ -212,6 +212,10 @@ fn goal_points(
     if points.len() < needed {
         let found = points.len();
         return Err(TooFewMatches::new_err(format!("goal has {found} features, expected at least {needed}")));
+    }
+    match camera {
+        Some(camera) => coordinates::in_pixels("goal", &points, camera)?,
+        None => coordinates::on_plane("goal", &points)?,
     }
     let on_plane = |(row, &[u, v]): (usize, &[f64; 2])| {
         point_on_plane(camera, [u, v]).ok_or_else(|| {
