@@ -47,7 +47,8 @@ use crate::{arrays, options};
 /// ------
 /// NoPose
 ///     Where the best pose agrees with no more matches than chance explains. With fewer than ten matches, of which
-///     that cannot be said, the best pose is returned where five agree with it, with its runner-up.
+///     that cannot be said, the best pose is returned where five agree with it, with its runner-up. Also where no pose turns the
+///     known direction as told.
 /// TooFewMatches
 ///     For fewer than five matches, or than the solver takes.
 /// ShapeMismatch, DegenerateInput, BadCamera

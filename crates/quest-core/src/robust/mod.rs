@@ -86,7 +86,8 @@ pub fn estimate(matches: &[Correspondence], options: &Options) -> Result<Estimat
 /// As [`estimate`], with what is known beside the matches.
 ///
 /// # Errors
-/// Those of [`estimate`], and [`EstimateError::Option`] for a prior that is not finite.
+/// Those of [`estimate`], [`EstimateError::Option`] for a prior that is not finite, and [`EstimateError::Direction`] where no pose
+/// turns the known direction as told.
 pub fn estimate_with(
     matches: &[Correspondence],
     options: &Options,
