@@ -3,12 +3,14 @@
 import copy
 import json
 import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 import quest_pose as qp
+from quest_pose.servo import CameraServo
 from scenes import Array, K, Scene, make_scene
 
 CAMERA = qp.Camera("PINHOLE", [1060, 1060, 514, 384], width=1024, height=768)
@@ -118,19 +120,20 @@ def test_a_known_direction_holds_for_the_answer() -> None:
 
 def test_coordinates_of_the_wrong_unit_are_refused() -> None:
     scene = make_scene(1, 30)
-    limits = {"max_speed": 0.1, "max_turn_rate": 0.3}
-    for call in [
+    without: list[Callable[[], object]] = [
         lambda: qp.estimate(scene.u1, scene.u2, threshold=1.0),
         lambda: qp.solve(scene.u1, scene.u2),
-        lambda: qp.servo.CameraServo(scene.u1, **limits, noise=0.5),
-    ]:
+        lambda: CameraServo(scene.u1, max_speed=0.1, max_turn_rate=0.3, noise=0.5),
+    ]
+    for call in without:
         with pytest.raises(qp.BadCamera, match="looks like pixels and no camera is given"):
             call()
-    for call in [
+    with_camera: list[Callable[[], object]] = [
         lambda: qp.estimate(scene.x1, scene.x2, K),
         lambda: qp.solve(scene.x1, scene.x2, K),
-        lambda: qp.servo.CameraServo(scene.x1, K, **limits, noise=0.5),
-    ]:
+        lambda: CameraServo(scene.x1, K, max_speed=0.1, max_turn_rate=0.3, noise=0.5),
+    ]
+    for call in with_camera:
         with pytest.raises(qp.QuestError, match="within 2 pixels of the corner"):
             call()
 
