@@ -207,11 +207,12 @@ fn describe_no_pose(inliers: usize, matches: usize, false_share: f64) -> String 
 }
 
 fn describe_direction(off: Option<f64>, tolerance: f64) -> String {
-    let text = format!(
-        "no pose could be found that turns the known direction to within {:.3} degrees of where it is in view 2",
+    let best =
+        off.map_or_else(String::new, |off| format!(": the best one misses it by {:.3}", off.to_degrees()));
+    format!(
+        "no pose could be found that turns the known direction to within {:.3} degrees of where it is in view 2{best}",
         tolerance.to_degrees()
-    );
-    off.map_or(text.clone(), |off| format!("{text}: the best one misses it by {:.3}", off.to_degrees()))
+    )
 }
 
 impl Priors<'_> {
