@@ -280,11 +280,13 @@ fn one_pair(
         Err(error @ EstimateError::Option { .. }) => return Err(Failure::Arguments(error.to_string())),
         // One pair of a file that has no pose is no reason to stop; a file that holds nothing else is bad input.
         Err(EstimateError::Input(error)) if !(is_several || matches!(error, InputError::Match { .. })) => {
-            return Err(pair.refuse(error).into());
+            let left_out = left_out(match_count, &usable);
+            return Err(Failure::Arguments(format!("{}{left_out}", pair.refuse(error))));
         }
         Err(error) => {
             let record = EstimateRecord::no_pose(pair.name.clone(), &error, elapsed_ms);
-            let reason = format!("{error}{}", arguments.narrow(&pair, &error));
+            let left_out = left_out(match_count, &usable);
+            let reason = format!("{error}{}{left_out}", arguments.narrow(&pair, &error));
             (EstimateRecord { reason: Some(reason.clone()), ..record }, Some(reason))
         }
     };
@@ -294,6 +296,14 @@ fn one_pair(
     let why = reason.as_deref().map(words::after_no_pose);
     let refusal = why.map(|why| Refusal::NoPose(format!("{}: {why}", pair.place)));
     Ok(Estimated { heading, record, focal_length: pair.focal_length(), refusal })
+}
+
+/// What to say of the matches without a bearing where there is no pose.
+fn left_out(match_count: usize, usable: &Usable) -> String {
+    match usable.invalid.len() {
+        0 => String::new(),
+        invalid => format!("; {invalid} of {match_count} matches had no bearing and were left out"),
+    }
 }
 
 /// The estimate of the usable matches of a pair, its inliers among all of them.

@@ -42,7 +42,10 @@ impl Tally {
 
     /// Whether a fault is to be said: what the call lacks for one pair it may lack for thousands.
     fn is_new(&mut self, fault: &Fault) -> bool {
-        if !matches!(fault, Fault::NoThreshold | Fault::Pixels | Fault::FirstCameraMissing) {
+        if !matches!(
+            fault,
+            Fault::NoThreshold | Fault::Pixels | Fault::PointsOfThePlane | Fault::FirstCameraMissing
+        ) {
             return true;
         }
         let text = fault.to_string();

@@ -159,6 +159,14 @@ fn a_number_that_csv_does_not_have_is_an_outlier() {
 }
 
 #[test]
+fn a_refusal_tells_of_the_matches_that_were_left_out() {
+    let rows = "u1,v1,u2,v2\n0,0,0,0\n0.1,0,0.2,0\n0,0.3,0.1,0.2\n0.2,0.1,0.4,0\nNaN,0,0,0\n";
+    let run = run_in(Path::new("."), &["estimate", "-", "--threshold", "1e-3"], rows.as_bytes());
+    let expected = "; 1 of 5 matches had no bearing and were left out\n";
+    assert!(run.status == 2 && run.stderr.ends_with(expected), "{}", run.stderr);
+}
+
+#[test]
 fn a_nan_and_a_pixel_without_a_ray_spoil_no_other_pair() {
     let barrel = |name: &str, points, spoil: Option<(&str, serde_json::Value)>| {
         let mut file: serde_json::Value = serde_json::from_str(&pair(name, points)).unwrap();

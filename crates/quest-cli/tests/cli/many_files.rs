@@ -127,6 +127,27 @@ fn what_the_call_lacks_is_said_once_with_its_count() {
 }
 
 #[test]
+fn coordinates_of_another_unit_are_said_once_with_their_count() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..4 {
+        fs::copy(example("points.csv"), folder.path().join(format!("{number}.csv"))).unwrap();
+    }
+    let camera = ["--camera1", "SIMPLE_PINHOLE,640,640,500,320,320"];
+    let run = run_in(folder.path(), &[&["estimate", ".", "--quiet"], &camera[..]].concat(), b"");
+    assert_eq!(
+        (run.status, run.stderr.matches("within 2 pixels of the corner").count()),
+        (2, 1),
+        "{}",
+        run.stderr
+    );
+    assert!(
+        run.stderr.ends_with("none of the 4 pairs can be read, all for the reason above\n"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
 fn a_pair_without_a_scale_costs_itself_alone() {
     let folder = folder();
     let files = [example("tumfr3_98072_98172.json"), "a.csv".to_owned()];

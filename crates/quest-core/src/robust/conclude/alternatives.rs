@@ -51,8 +51,10 @@ pub(crate) fn alternatives(poses: &mut PoseScorer, plane: &Plane, polished: &Pol
         let mut refined = of_plane;
         let count = pose.inliers.len().min(MATCHES);
         // Refining one beside the pose would only find the pose again.
-        if count >= FEWEST && !is_same(&of_plane.motion, polished.motion()) {
-            let subset = Subset::new(&poses.observations.columns, &pose.inliers[..count]);
+        let is_refined = count >= FEWEST && !is_same(&of_plane.motion, polished.motion());
+        let subset = is_refined.then(|| Subset::new(&poses.observations.columns, &pose.inliers[..count]));
+        poses.recycle(pose);
+        if let Some(subset) = subset {
             let mut motion = of_plane.motion;
             refine(&subset, &mut motion, &loss, FINE, STEPS);
             if let Some(found) = poses.best_pose(&motion.essential(), wide) {
@@ -60,7 +62,6 @@ pub(crate) fn alternatives(poses: &mut PoseScorer, plane: &Plane, polished: &Pol
                 poses.recycle(found);
             }
         }
-        poses.recycle(pose);
         all.push(Alternative { of_plane, refined });
     }
     all

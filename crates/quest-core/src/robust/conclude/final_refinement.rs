@@ -59,6 +59,7 @@ pub(crate) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
         let some = pose.inliers.len().min(ENOUGH);
         let subset = Subset::new(&poses.observations.columns, &pose.inliers[..some]);
         refine(&subset, &mut motion, &Truncated::new(threshold), FINE, STEPS);
+        drop(subset);
         if let Some(better) = best_of(poses, &motion).filter(|found| found.cost < pose.scored.cost) {
             poses.recycle(pose);
             pose = poses.score(better.motion, threshold);
@@ -67,18 +68,21 @@ pub(crate) fn polish(poses: &mut PoseScorer, start: Motion) -> Polished {
     let shown = noise::estimate(pose.inlier_residuals(), threshold);
     let noise = noise::prudent(shown, pose.inliers.len(), threshold);
     let limit = WIDE * noise;
-    let wide = poses.score(pose.scored.motion, limit);
+    let mut motion = pose.scored.motion;
+    poses.recycle(pose);
+    let mut wide = poses.score(motion, limit);
     let is_normal = noise::is_normal(wide.inlier_residuals(), shown);
     let loss = HeavyTailed::new(noise * if is_normal { WIDTH_OF_NORMAL } else { WIDTH });
-    if wide.inliers.len() >= FEWEST {
-        let mut motion = pose.scored.motion;
-        let subset = Subset::new(&poses.observations.columns, &wide.inliers);
-        refine(&subset, &mut motion, &loss, FINE, STEPS);
-        let motion = best_of(poses, &motion).map_or(pose.scored.motion, |best| best.motion);
-        poses.recycle(pose);
-        pose = poses.score(motion, threshold);
-    }
+    let inliers = std::mem::take(&mut wide.inliers);
     poses.recycle(wide);
+    if inliers.len() >= FEWEST {
+        let mut refined = motion;
+        let subset = Subset::new(&poses.observations.columns, &inliers);
+        refine(&subset, &mut refined, &loss, FINE, STEPS);
+        drop(subset);
+        motion = best_of(poses, &refined).map_or(motion, |best| best.motion);
+    }
+    let pose = poses.score(motion, threshold);
     let sigma = noise::estimate(pose.inlier_residuals(), threshold);
     Polished { pose, sigma, loss, limit, by_chance: ByChance::unknown() }
 }

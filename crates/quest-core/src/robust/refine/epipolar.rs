@@ -29,20 +29,18 @@ const SHORT: f64 = 1e-8;
 /// Some of the matches, in columns of their own.
 #[derive(Clone, Debug)]
 pub(crate) struct Subset {
-    blocks: Vec<Block>,
+    /// The columns of a few matches, then those of the next few: [`PLANE`] or [`SPHERE`] columns each. The last match is repeated where
+    /// there are fewer.
+    columns: Vec<[f64; WIDTH]>,
     len: usize,
     inverse_scales: [[f64; 3]; 2],
     curvature: f64,
     is_sphere: bool,
 }
 
-/// A few matches, the last of all repeated where there are fewer.
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    columns: [[f64; WIDTH]; 6],
-    /// One for a match, zero for a repeated one.
-    live: [f64; WIDTH],
-}
+/// The columns of a match on two planes, where `z` is one, and on two spheres.
+const PLANE: usize = 4;
+const SPHERE: usize = 6;
 
 /// The normal equations of a step.
 #[derive(Clone, Copy, Debug)]
@@ -83,15 +81,16 @@ impl One {
 
 impl Subset {
     pub(crate) fn new(all: &Columns, indices: &[u32]) -> Self {
-        let block = |some: &[u32]| {
+        let kept: &[usize] = if all.is_sphere() { &[0, 1, 2, 3, 4, 5] } else { &[0, 1, 3, 4] };
+        let mut columns = Vec::with_capacity(indices.len().div_ceil(WIDTH) * kept.len());
+        for some in indices.chunks(WIDTH) {
             let index = |j: usize| some[j.min(some.len() - 1)] as usize;
-            Block {
-                columns: std::array::from_fn(|k| std::array::from_fn(|j| all.at(k, index(j)))),
-                live: std::array::from_fn(|j| if j < some.len() { 1.0 } else { 0.0 }),
-            }
-        };
+            columns.extend(
+                kept.iter().map(|&k| -> [f64; WIDTH] { std::array::from_fn(|j| all.at(k, index(j))) }),
+            );
+        }
         Self {
-            blocks: indices.chunks(WIDTH).map(block).collect(),
+            columns,
             len: indices.len(),
             inverse_scales: all.inverse_scales(),
             curvature: all.curvature(),
@@ -109,7 +108,7 @@ impl Subset {
     }
 
     #[inline(always)]
-    fn accumulate<const SPHERE: bool>(
+    fn accumulate<const COLUMNS: usize>(
         &self,
         f: &[f64; 9],
         df: &[[f64; 9]; 5],
@@ -118,8 +117,10 @@ impl Subset {
         let mut cost = [0.0; WIDTH];
         let mut upper = [[0.0; WIDTH]; 15];
         let mut gradient = [[0.0; WIDTH]; 5];
-        for Block { columns, live } in &self.blocks {
-            let (residual, slope) = linearised::<SPHERE>(f, columns, self.curvature);
+        for (before, columns) in (0..).step_by(WIDTH).zip(self.columns.as_chunks::<COLUMNS>().0) {
+            // One for a match, zero for a repeated one.
+            let live: [f64; WIDTH] = std::array::from_fn(|j| if before + j < self.len { 1.0 } else { 0.0 });
+            let (residual, slope) = linearised(f, columns, self.curvature);
             let mut weight = [0.0; WIDTH];
             for j in 0..WIDTH {
                 let (c, w) = loss.cost_and_weight(residual[j] * residual[j]);
@@ -172,43 +173,45 @@ impl<L: RobustLoss> Work for Accumulation<'_, L> {
     fn run<S: Simd>(self, _: S) -> Equations {
         let Self { subset, f, df, loss } = self;
         if subset.is_sphere {
-            subset.accumulate::<true>(&f, &df, &loss)
+            subset.accumulate::<SPHERE>(&f, &df, &loss)
         } else {
-            subset.accumulate::<false>(&f, &df, &loss)
+            subset.accumulate::<PLANE>(&f, &df, &loss)
         }
     }
 }
 
 /// The residuals of a few matches, and their derivatives by the entries of `F`, row by row.
 #[inline(always)]
-fn linearised<const SPHERE: bool>(
+fn linearised<const COLUMNS: usize>(
     f: &[f64; 9],
-    [x1, y1, z1, x2, y2, z2]: &[[f64; WIDTH]; 6],
+    columns: &[[f64; WIDTH]; COLUMNS],
     curvature: f64,
 ) -> ([f64; WIDTH], [[f64; WIDTH]; 9]) {
+    let is_sphere = COLUMNS == SPHERE;
+    let (view1, view2) = columns.split_at(COLUMNS / 2);
     let mut residual = [0.0; WIDTH];
     let mut slope = [[0.0; WIDTH]; 9];
     for j in 0..WIDTH {
-        let (z1, z2) = if SPHERE { (z1[j], z2[j]) } else { (1.0, 1.0) };
-        let (x1, y1, x2, y2) = (x1[j], y1[j], x2[j], y2[j]);
+        let (z1, z2) = if is_sphere { (view1[2][j], view2[2][j]) } else { (1.0, 1.0) };
+        let (x1, y1, x2, y2) = (view1[0][j], view1[1][j], view2[0][j], view2[1][j]);
         let l0 = f[0] * x1 + f[1] * y1 + f[2] * z1;
         let l1 = f[3] * x1 + f[4] * y1 + f[5] * z1;
         let l2 = f[6] * x1 + f[7] * y1 + f[8] * z1;
         let m0 = f[0] * x2 + f[3] * y2 + f[6] * z2;
         let m1 = f[1] * x2 + f[4] * y2 + f[7] * z2;
-        let m2 = if SPHERE { f[2] * x2 + f[5] * y2 + f[8] * z2 } else { 0.0 };
+        let m2 = if is_sphere { f[2] * x2 + f[5] * y2 + f[8] * z2 } else { 0.0 };
         let e = x2 * l0 + y2 * l1 + z2 * l2;
         let mut square = l0 * l0 + l1 * l1 + m0 * m0 + m1 * m1;
-        if SPHERE {
+        if is_sphere {
             square += l2 * l2 + m2 * m2 - e * e * curvature;
         }
         let inverse = 1.0 / square.max(f64::MIN_POSITIVE).sqrt();
         let r = e * inverse;
         // dr = de/√g − r/(2g) dg, where dg = 2 (l · dl + m · dm − κ e de).
         let q = r * inverse * inverse;
-        let along = if SPHERE { inverse + q * e * curvature } else { inverse };
-        let (p0, p1, p2) = (q * l0, q * l1, if SPHERE { q * l2 } else { 0.0 });
-        let (s0, s1, s2) = (q * m0, q * m1, if SPHERE { q * m2 } else { 0.0 });
+        let along = if is_sphere { inverse + q * e * curvature } else { inverse };
+        let (p0, p1, p2) = (q * l0, q * l1, if is_sphere { q * l2 } else { 0.0 });
+        let (s0, s1, s2) = (q * m0, q * m1, if is_sphere { q * m2 } else { 0.0 });
         residual[j] = r;
         slope[0][j] = along * x2 * x1 - p0 * x1 - s0 * x2;
         slope[1][j] = along * x2 * y1 - p0 * y1 - s1 * x2;

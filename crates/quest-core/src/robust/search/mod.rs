@@ -370,25 +370,25 @@ impl<'a> Search<'a> {
     /// Refines a pose over its inliers.
     fn optimise(&mut self, start: ScoredPose) -> Scored {
         let loss = Biweight::new(WIDTH * self.poses.threshold());
-        let mut best = start;
+        let first = |inliers: &[u32]| inliers[..inliers.len().min(MATCHES)].to_vec();
+        let (mut best, mut some) = (start.scored, first(&start.inliers));
+        self.poses.recycle(start);
         for _ in 0..ROUNDS {
-            let count = best.inliers.len().min(MATCHES);
-            if count < MAX_SAMPLE.min(self.observations.len()) {
+            if some.len() < MAX_SAMPLE.min(self.observations.len()) {
                 break;
             }
-            let subset = Subset::new(&self.observations.columns, &best.inliers[..count]);
-            let mut motion = best.scored.motion;
-            refine(&subset, &mut motion, &loss, COARSE, STEPS);
+            let mut motion = best.motion;
+            refine(&Subset::new(&self.observations.columns, &some), &mut motion, &loss, COARSE, STEPS);
             let Some(pose) = self.poses.best_pose(&motion.essential(), self.width()) else { break };
-            if pose.scored.cost < best.scored.cost && self.allows(&pose.scored) {
-                self.poses.recycle(std::mem::replace(&mut best, pose));
-            } else {
-                self.poses.recycle(pose);
+            let is_better = pose.scored.cost < best.cost && self.allows(&pose.scored);
+            if is_better {
+                (best, some) = (pose.scored, first(&pose.inliers));
+            }
+            self.poses.recycle(pose);
+            if !is_better {
                 break;
             }
         }
-        let scored = best.scored;
-        self.poses.recycle(best);
-        scored
+        best
     }
 }

@@ -17,6 +17,9 @@ const WIDTH: usize = 8;
 /// Enough votes to tell four poses apart.
 const MAX_VOTES: usize = 256;
 
+/// Of so many matches no memory is kept: to ask for it takes no time beside that of a score, and ten million need 160 MB.
+const LARGE: usize = 1 << 20;
+
 /// A motion and its score.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scored {
@@ -79,9 +82,11 @@ impl<'a> PoseScorer<'a> {
         PoseScorer::new(observations, self.loss)
     }
 
-    /// Takes the memory of a pose that is not needed any more.
+    /// Takes the memory of a pose that is not needed any more, unless it is large.
     pub(crate) fn recycle(&mut self, pose: ScoredPose) {
-        self.spare.push((pose.residuals, pose.inliers));
+        if pose.residuals.values.len() < LARGE {
+            self.spare.push((pose.residuals, pose.inliers));
+        }
     }
 
     /// The best of the four poses of an essential matrix, its inliers within `limit` pixels.

@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use crate::RelativePose;
+use crate::servo::controller::contradictions::Contradictions;
 use crate::servo::controller::rig::Rig;
 use crate::servo::controller::safety::Safety;
 use crate::servo::controller::state::State;
-use crate::servo::controller::watchdog::{LEAST, Watchdog};
+use crate::servo::controller::watchdog::Watchdog;
 use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion};
 use crate::servo::twist::{Limits, Twist};
 
@@ -119,18 +120,19 @@ impl Memory {
         let variance = estimate.covariance.map_or(0.0, |c| (0..3).map(|k| c[(k, k)]).sum());
         let turn = Motion { linear: Vector3::zeros(), ..*motion };
         let turns_away = self.turning.is_diverging(square, 1.0, variance, &turn);
-        self.watchdog.found += usize::from(turns_away) * Contradictions::COUNT;
+        if turns_away {
+            self.watchdog.count_as_two();
+        }
         turns_away
     }
 
     /// Whether the camera was seen again and again not to go where it is sent.
     pub(crate) fn is_contradicted(&mut self) -> bool {
-        let is = self.contradictions.in_a_row >= Contradictions::MOST;
-        if is {
-            self.contradictions.in_a_row = 1;
-            self.watchdog.found += Contradictions::COUNT;
+        let is_contradicted = self.contradictions.are_a_divergence();
+        if is_contradicted {
+            self.watchdog.count_as_two();
         }
-        is
+        is_contradicted
     }
 
     /// Counts the time at the goal.
@@ -148,51 +150,6 @@ impl Memory {
             && pose.q_21.angle() <= arrival.angle;
         self.at_goal_seconds = if is_there { self.at_goal_seconds + seconds } else { 0.0 };
         self.arrived = is_there && self.at_goal_seconds >= arrival.seconds;
-    }
-}
-
-/// How often the estimator has begun anew because the motion contradicted it, without a pose that the motion confirmed in between. An
-/// estimator may be wrong once. One that is wrong again and again sees a robot that does not do what it is told.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Contradictions {
-    in_a_row: u8,
-    /// The restarts of the estimator that have been counted.
-    restarts: usize,
-    /// Images followed at full speed since the last one.
-    tracked: usize,
-}
-
-impl Contradictions {
-    /// So many images at full speed are no chance.
-    const ENOUGH: usize = 15;
-    /// So many in a row are a divergence, and count as two.
-    const MOST: u8 = 4;
-    const COUNT: usize = 2;
-
-    /// Counts what the estimator did at this image, unless the goal is so near that noise may contradict the motion.
-    pub(crate) fn count(&mut self, restarts: usize, state: State, potential: Option<f64>) {
-        if !potential.is_some_and(|value| value > LEAST) {
-            self.expect(restarts);
-        }
-        if restarts > self.restarts {
-            (self.restarts, self.tracked) = (restarts, 0);
-            self.in_a_row = self.in_a_row.saturating_add(1);
-        }
-        self.tracked += usize::from(state == State::Tracking);
-        if self.tracked >= Self::ENOUGH {
-            self.in_a_row = 0;
-        }
-    }
-
-    /// The estimator has begun anew for another reason.
-    pub(crate) fn expect(&mut self, restarts: usize) {
-        self.restarts = restarts;
-    }
-
-    /// The share of its speed that a camera is trusted with until the motion confirms the pose: each contradiction halves it, so that
-    /// a camera that goes astray does not go far.
-    pub(crate) fn trust(self) -> f64 {
-        0.5_f64.powi(i32::from(self.in_a_row.min(Self::MOST)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! From an image to a command: clock, estimator, state, law, guards, limits.
 
+mod contradictions;
 pub(crate) mod joints;
 mod memory;
 pub(crate) mod rig;
@@ -176,7 +177,9 @@ impl<E: PoseEstimator, L: ControlLaw> Servo<E, L> {
         let begin = self.estimator.begin().map(|begin| self.rig.mount.pose_for_law(&begin, self.rig.unit));
         let scale = begin.and_then(|begin| self.potential(&begin)).unwrap_or(1.0);
         let variance = estimate.covariance.map_or(0.0, |c| c.trace());
-        self.memory.contradictions.count(self.estimator.restarts(), state, potential);
+        if self.safety.watchdog {
+            self.memory.contradictions.count(self.estimator.restarts(), state, potential);
+        }
         if self.safety.watchdog
             && (self.memory.watchdog.is_diverging(potential, scale, variance, &motion)
                 || self.memory.turns_away(state, estimate, &motion)

@@ -67,6 +67,11 @@ impl Watchdog {
         diverges
     }
 
+    /// Counts a divergence that leaves no doubt: as two.
+    pub(crate) fn count_as_two(&mut self) {
+        self.found += 2;
+    }
+
     /// Begins a new window, for what happened in between is not the law's doing.
     pub(crate) fn forget(&mut self) {
         self.first = None;
