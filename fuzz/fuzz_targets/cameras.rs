@@ -23,10 +23,13 @@ fuzz_target!(|bytes: &[u8]| {
         let Ok(ray) = camera.bearing(pixel) else { continue };
         assert!(ray.z == 1.0 || (ray.norm() - 1.0).abs() < 1e-9, "{camera:?} {pixel:?} {ray:?}");
         let Ok(back) = camera.project(&ray) else { continue };
-        // Both sides of a panorama are the same direction.
-        let across = (back[0] - pixel[0]).abs();
-        let round = if model == CameraModel::Equirectangular { (across - params[0]).abs() } else { across };
-        let off = across.min(round).hypot(back[1] - pixel[1]);
+        let off = if model == CameraModel::Equirectangular {
+            // Both sides of a panorama are one direction, and so is the whole row of a pole: directions are compared.
+            let Ok(again) = camera.bearing(back) else { panic!("{camera:?}: no ray of {back:?}") };
+            ray.angle(&again) * params[0] / std::f64::consts::TAU
+        } else {
+            (back[0] - pixel[0]).hypot(back[1] - pixel[1])
+        };
         // Rounding of the ray in pixels of the largest focal length, times what the distortion stretches.
         assert!(!is_sane || off < 1e-3, "{camera:?} {pixel:?}: off by {off}");
     }

@@ -290,7 +290,11 @@ impl Camera {
         };
         let limit = self.lens.max_radius();
         let ((fx, fy), (cx, cy)) = (self.focal_lengths(), self.principal_point());
-        let pixel = [fx * distorted.x + cx, fy * distorted.y + cy];
+        let mut pixel = [fx * distorted.x + cx, fy * distorted.y + cy];
+        if matches!(self.lens, Lens::Panorama) {
+            // Rounding leads out of the image, where a pixel has no ray.
+            pixel = [pixel[0].clamp(0.0, self.params[0]), pixel[1].clamp(0.0, self.params[1])];
+        }
         // The slack lets the rays of pixels on the border, which are rounded, return to them.
         if radius <= limit * (1.0 + 8.0 * f64::EPSILON) && pixel.iter().all(|c| c.is_finite()) {
             Ok(pixel)

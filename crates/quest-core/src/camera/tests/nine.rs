@@ -135,3 +135,16 @@ fn a_panorama_sees_all_directions_and_has_a_border() {
     // At the poles every longitude is right.
     assert!(camera.project(&(-Vector3::y() * 1e300)).unwrap()[1].abs() < 1e-12);
 }
+
+#[test]
+fn the_border_of_a_panorama_leads_back_into_it() {
+    for eighths in 1..4_000 {
+        let size = [f64::from(eighths) / 8.0, f64::from(eighths) / 16.0];
+        let camera = Camera::new(CameraModel::Equirectangular, &size).unwrap();
+        for [x, y] in [[0.0, 0.35], [1.0, 0.35], [0.3, 0.0], [0.3, 1.0], [0.0, 0.0], [1.0, 1.0]] {
+            let ray = camera.bearing([x * size[0], y * size[1]]).unwrap();
+            let again = camera.bearing(camera.project(&ray).unwrap()).unwrap();
+            assert!(ray.angle(&again) < 1e-7, "{size:?}, {x} {y}");
+        }
+    }
+}
