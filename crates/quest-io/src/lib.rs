@@ -39,7 +39,7 @@ pub use estimate_record::{
     EstimateRecord, EvidenceRecord, FoundRecord, PoseRecord, RunnerUpRecord, ThirdViewRecord,
 };
 pub use json_text::write_json;
-pub use npz::unpack_npz;
+pub use npz::{open_npy, unpack_npz};
 pub use output::{Output, WriteError};
 pub use pair::{Gap, Pair, Truth};
 #[cfg(feature = "parquet")]

@@ -12,7 +12,7 @@ use npyz::{Deserialize, NpyFile, Order};
 use super::table::{Columns, Rows};
 use crate::{
     error::{Fault, Place, ReadError},
-    npz::unpack_npz,
+    npz::{open_npy, unpack_npz},
 };
 
 const ARRAY: &[u8] = b"\x93NUMPY";
@@ -69,10 +69,7 @@ struct Table {
 impl Table {
     /// An array of one, two or, where the middle one has the length 1, three dimensions; of one dimension as a column.
     fn read(bytes: &[u8]) -> Result<Self, String> {
-        if !is_countable(bytes) {
-            return Err("found an array of more numbers than can be counted".to_owned());
-        }
-        let array = NpyFile::new(bytes).map_err(|e| format!("found no array of NumPy's: {e}"))?;
+        let array = open_npy(bytes)?;
         let shape = array.shape().to_vec();
         // A header may promise more than follows it.
         let promised = shape.iter().try_fold(1_u64, |product, &n| product.checked_mul(n));
@@ -113,17 +110,6 @@ impl Table {
         let values = rows.flat_map(|(a, b)| [a, b].concat()).collect();
         Ok(Self { width: self.width + other.width, values })
     }
-}
-
-/// Whether the lengths in a header have a product: npyz multiplies them before they can be looked at.
-fn is_countable(bytes: &[u8]) -> bool {
-    /// NumPy's headers are of one or two lines.
-    const HEADER: usize = 1 << 16;
-    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(HEADER)]).into_owned();
-    let shape = header.split_once("shape").and_then(|(_, rest)| rest.split_once('(')).map(|(_, rest)| rest);
-    let lengths = shape.unwrap_or_default().split(')').next().unwrap_or_default().split(',');
-    let mut lengths = lengths.filter_map(|n| n.trim().parse::<u64>().ok());
-    lengths.try_fold(1_u64, u64::checked_mul).is_some()
 }
 
 /// The values of an array whatever the type of its numbers.

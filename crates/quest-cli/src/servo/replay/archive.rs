@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use npyz::{DType, Deserialize, NpyFile, Order};
+use npyz::{DType, Deserialize, Order};
 use serde::Deserialize as FromJson;
 
 use crate::Failure;
@@ -94,7 +94,7 @@ impl Columns {
     /// A column and its shape; none where the run has no such column.
     fn optional<T: Deserialize>(&self, name: &str) -> Result<Option<Array<T>>, String> {
         let Some(bytes) = self.0.get(name) else { return Ok(None) };
-        let array = NpyFile::new(bytes.as_slice()).map_err(|e| format!("{name}: {e}"))?;
+        let array = quest_io::open_npy(bytes).map_err(|e| format!("{name}: {e}"))?;
         let (shape, dtype) = (array.shape().to_vec(), array.dtype());
         // A header may promise more than follows it.
         if array.order() != Order::C || array.len() > bytes.len() as u64 {
