@@ -204,4 +204,21 @@ mod tests {
         assert!(names.iter().all(|name| name.chars().all(|c| c.is_ascii_lowercase() || c == '_')));
         assert!(words.iter().all(|text| text.contains(' ')));
     }
+
+    #[test]
+    fn a_full_list_takes_no_more() {
+        let candidate = |in_front: usize| Candidate {
+            kind: CandidateKind::Exact,
+            pose: RelativePose::identity(),
+            residual: 0.0,
+            in_front,
+        };
+        let mut list = Candidates::default();
+        (0..Candidates::CAPACITY + 3).for_each(|k| list.push(candidate(k)));
+        assert_eq!(list.len(), Candidates::CAPACITY);
+        assert!(list.iter().enumerate().all(|(k, candidate)| candidate.in_front == k));
+        list.set_degeneracy(Degeneracy::Collinear);
+        list.clear();
+        assert!(list.is_empty() && list.degeneracy().is_none());
+    }
 }

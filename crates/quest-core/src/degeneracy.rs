@@ -113,4 +113,36 @@ mod tests {
         assert!(!nearly_on_a_line(&some, [1e-3; 2]));
         assert!(!nearly_on_a_line(&with(1e-4), [1e-3, 1e-6]));
     }
+
+    #[test]
+    fn the_reason_is_the_one_that_was_planted() {
+        let general = [
+            [[0.1, 0.2], [0.3, 0.1]],
+            [[-0.2, 0.3], [-0.1, 0.4]],
+            [[0.4, -0.1], [0.5, -0.3]],
+            [[-0.3, -0.4], [-0.2, -0.5]],
+            [[0.0, 0.5], [0.2, 0.6]],
+            [[0.5, 0.4], [0.6, 0.2]],
+        ];
+        let reason = |points: &[[[f64; 2]; 2]]| {
+            let of = |[x1, x2]: &[[f64; 2]; 2]| Correspondence::from_image_points(*x1, *x2).unwrap();
+            diagnose(&points.iter().map(of).collect::<Vec<_>>())
+        };
+        assert_eq!(reason(&general), Degeneracy::RankDeficient);
+        // One place in either view.
+        for view in [0, 1] {
+            let mut points = general;
+            points.iter_mut().for_each(|point| point[view] = [0.1, -0.2]);
+            assert_eq!(reason(&points), Degeneracy::Coincident);
+        }
+        // Four matches and one of them again and again: fewer than five differ.
+        let mut points = general;
+        (points[4], points[5]) = (points[0], points[0]);
+        assert_eq!(reason(&points), Degeneracy::Duplicate);
+        // A point of view 1 with another one in view 2 is another match.
+        points[4][1] = [0.2, 0.6];
+        assert_eq!(reason(&points), Degeneracy::RankDeficient);
+        let line: Vec<_> = (0..6).map(|k| 0.1 * f64::from(k)).map(|s| [[s, 0.3 * s], [s * s, 0.2]]).collect();
+        assert_eq!(reason(&line), Degeneracy::Collinear);
+    }
 }

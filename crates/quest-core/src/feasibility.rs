@@ -247,4 +247,30 @@ mod tests {
         assert_eq!(in_front(&pose, &matches), 5);
         assert!(!theorem_2(&pose, &matches));
     }
+
+    #[test]
+    fn every_condition_of_theorem_2_is_over_all_matches() {
+        let pose = RelativePose::new(UnitQuaternion::identity(), Vector3::new(1.0, 0.0, 0.0));
+        let good = seen(&pose, &Vector3::new(0.3, 0.4, 3.0)).unwrap();
+        // Along the translation a point is on neither side.
+        let along = seen(&pose, &Vector3::new(0.5, 0.0, 3.0)).unwrap();
+        let behind = Correspondence::from_bearings([0.1, 0.2, 1.0], [0.1, 0.2, -1.0]).unwrap();
+        let turned_back = Correspondence::from_image_points([0.3, 0.1], [0.1, 0.1]).unwrap();
+        let across = Correspondence::from_image_points([0.1, 0.2], [0.4, -0.2]).unwrap();
+        let conditions = |matches: &[Correspondence]| {
+            let Verdict { is_ahead, turns_away, stays_on_its_side } = verdict(&pose, matches);
+            [is_ahead, turns_away, stays_on_its_side]
+        };
+        assert_eq!(verdict(&pose, &[good, along]), Verdict::FEASIBLE);
+        assert!(verdict(&pose, &[]).is_feasible());
+        for (bad, which) in [(behind, 0), (turned_back, 1), (across, 2)] {
+            // Wherever it stands among the others.
+            for matches in [[bad, good, along], [good, bad, along], [good, along, bad]] {
+                assert!(!conditions(&matches)[which], "condition {which}");
+                assert!(!theorem_2(&pose, &matches));
+            }
+        }
+        let all = [behind, turned_back, across, good];
+        assert_eq!(conditions(&all), [false; 3]);
+    }
 }

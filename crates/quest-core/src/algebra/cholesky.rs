@@ -80,6 +80,7 @@ mod tests {
     fn what_is_not_positive_definite_is_refused() {
         assert!(!factor(&mut [1.0, 0.0, 2.0, 1.0], 2));
         assert!(!factor(&mut [f64::NAN], 1));
+        assert!(!factor(&mut [f64::INFINITY], 1));
         assert!(!factor(&mut [0.0], 1));
     }
 }

@@ -199,4 +199,19 @@ mod tests {
             assert!(found.iter().zip(x).all(|(f, x)| (f - x).norm() < 1e-10));
         }
     }
+
+    #[test]
+    fn matrices_without_a_pivot_are_told() {
+        for bad in [0.0, f64::NAN] {
+            // The first column, then the second one after a good first one.
+            for column in [0, 1] {
+                let mut a = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
+                a.iter_mut().for_each(|row| row[column] = bad);
+                assert!(reduce(&mut a, 0) <= 0.0, "{bad} {column}");
+                let mut a = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 10.0]];
+                a.iter_mut().for_each(|row| row[column] = bad);
+                assert!(null_vector(&mut a).is_none(), "{bad} {column}");
+            }
+        }
+    }
 }

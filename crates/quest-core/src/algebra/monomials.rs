@@ -47,3 +47,24 @@ pub(crate) fn evaluate<const N: usize>(list: &[[u8; 4]; N], form: &[f64; N], q: 
     let monomial = |e: &[u8; 4]| (0..4).map(|k| q[k].powi(e[k].into())).product::<f64>();
     list.iter().zip(form).map(|(e, c)| c * monomial(e)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn monomials_stand_where_they_are_found() {
+        let list = homogeneous::<35>(4);
+        assert!(list.iter().enumerate().all(|(k, e)| position(&list, *e) == k));
+        assert!(list.iter().all(|e| e.iter().sum::<u8>() == 4));
+        // Of different degrees, where the last exponent alone tells them apart.
+        assert_eq!(position(&[[1, 0, 0, 2], [1, 0, 0, 3]], [1, 0, 0, 3]), 1);
+        assert_eq!(sum([1, 0, 0, 2], [0, 1, 0, 3]), [1, 1, 0, 5]);
+    }
+
+    #[test]
+    #[should_panic(expected = "the monomial is not in the list")]
+    fn a_monomial_that_is_not_in_the_list_has_no_place() {
+        position(&homogeneous::<4>(1), [2, 0, 0, 0]);
+    }
+}

@@ -164,4 +164,16 @@ mod tests {
         assert!(null_space::<5, 9, 4>(&a).1 < 1e-15);
         assert!(null_space::<5, 9, 4>(&[[0.0; 9]; 5]).1 <= 0.0);
     }
+
+    #[test]
+    fn tables_have_their_value_in_so_many_entries_from_each_one_on() {
+        for count in [1, 2, 5] {
+            for (k, row) in Blocks::<5>::table(7.0, count).iter().enumerate() {
+                for (j, entry) in row.as_flattened().iter().enumerate() {
+                    let expected = if (k..(k + count).min(5)).contains(&j) { 7.0 } else { 0.0_f64 };
+                    assert_eq!(entry.to_bits(), expected.to_bits(), "{count} entries from {k}: {j}");
+                }
+            }
+        }
+    }
 }

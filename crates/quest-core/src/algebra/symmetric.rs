@@ -233,4 +233,19 @@ mod tests {
         assert_eq!(smallest_eigenvector_3(&Matrix3::zeros()), None);
         assert_eq!(smallest_eigenvector_3(&Matrix3::from_element(f64::NAN)), None);
     }
+
+    #[test]
+    fn the_search_for_a_root_ends_where_there_is_no_slope() {
+        assert!((smallest_root(-2.0, |_| (0.0, 0.0)) + 2.0).abs() < 1e-15);
+        assert!((smallest_root(-2.0, |_| (1.0, 0.0)) + 2.0).abs() < 1e-15);
+        assert!((smallest_root(-2.0, |x| (x * x - 2.0, 2.0 * x)) + 2.0_f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_triangle_makes_both_halves() {
+        let m = symmetric::<3>(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(m, Matrix3::new(1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0));
+        // What is missing of it is zero.
+        assert_eq!(symmetric::<3>(&[1.0, 2.0]), Matrix3::new(1.0, 2.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0));
+    }
 }

@@ -154,4 +154,13 @@ mod tests {
         let (values, _) = eigen([[0.0, 2.0], [2.0, 0.0]]);
         assert!((values[0] - 2.0).abs() < 1e-15 && (values[1] + 2.0).abs() < 1e-15);
     }
+
+    #[test]
+    fn a_block_of_entries_whose_squares_vanish_falls_apart() {
+        let (mut values, mut off) = ([0.0; 2], [1e-200]);
+        let mut vectors = [[1.0, 0.0], [0.0, 1.0]];
+        iterate(&mut values, &mut off, &mut vectors);
+        assert!(values.iter().all(|value| value.abs() < 1e-100), "{values:?}");
+        assert!(vectors.as_flattened().iter().all(|x| x.is_finite()), "{vectors:?}");
+    }
 }

@@ -71,3 +71,24 @@ impl ClosedForm {
         Some(if is_inside { numerator / denominator } else { limit })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_radius_comes_back_and_none_beyond_it() {
+        let fov = [0.0, 0.3, 0.93, 2.0, 3.1].map(|omega| ClosedForm::Fov { omega });
+        let division = [-2.0, -0.25, -1e-9, 0.0, 0.1, 3.0].map(|k| ClosedForm::Division { k });
+        let eucm = [(0.0, 1.0), (0.5, 0.1), (0.6, 1.1), (0.9, 2.0), (1.0, 1.0), (1.0, 7.0)]
+            .map(|(alpha, beta)| ClosedForm::Eucm { alpha, beta });
+        for form in fov.into_iter().chain(division).chain(eucm) {
+            let (r, rd) = (form.max_radius(), form.max_distorted());
+            assert!(r > 0.0 && rd.is_finite(), "{form:?}");
+            let back = form.undistorted(rd).unwrap();
+            // At the border a rounding of the distorted radius may be most of the radius.
+            assert!(back <= r && form.distorted(back) >= rd * (1.0 - 1e-15), "{form:?}: {back} of {r}");
+            assert_eq!(form.undistorted(rd * (1.0 + 1e-9)), None, "{form:?}");
+        }
+    }
+}

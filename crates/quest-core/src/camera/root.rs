@@ -114,5 +114,10 @@ mod tests {
         assert_eq!(positive_up_to(&p, 7.0).to_bits(), 7f64.to_bits());
         p[4] = 1e30;
         assert_eq!(positive_up_to(&p, 7.0).to_bits(), 7f64.to_bits());
+        // One that begins without being positive is so nowhere.
+        for begin in [0.0, -1.0] {
+            p[0] = begin;
+            assert_eq!(positive_up_to(&p, 7.0).to_bits(), 0f64.to_bits());
+        }
     }
 }

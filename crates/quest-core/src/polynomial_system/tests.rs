@@ -353,3 +353,67 @@ fn the_engine_finds_the_solutions_of_the_solvers_a_thousand_times() {
         assert!(missed + more <= 8 && all > 8_000, "{solver}: {missed} missed, {more} more, of {all}");
     }
 }
+
+#[test]
+fn an_odd_root_of_a_negative_number_is_real() {
+    // x³ = −8, whose three roots are one solution but for the symmetry of the equation.
+    let found = solved(&system(&[&[(1.0, [3]), (8.0, [0])]]));
+    assert_eq!((found.report.grading, found.all.len()), (3, 1));
+    assert!(has(&found, &[real(&[-2.0])], 1e-12), "{:?}", found.all);
+}
+
+#[test]
+fn a_number_of_solutions_that_is_given_is_found_among_noise() {
+    // Equations with noise have no common solution: those of least squares are near the pose.
+    let mut near = 0;
+    for index in 0..10 {
+        let (system, truth) = pose_system(8, 0.1, 100 + index);
+        let options = Options { solutions: Some(2), ..Options::default() };
+        let found = solve(&system, &options).unwrap();
+        assert_eq!(found.all.len(), 2, "scene {index}");
+        let q = truth.wxyz();
+        let off = |s: &Solution| {
+            let dot: c64 = s.x.iter().zip(q).fold(c64::ZERO, |dot, (x, q)| dot + *x * q);
+            let norm = s.x.iter().map(c64::norm_sqr).sum::<f64>().sqrt();
+            1.0 - dot.norm() / norm
+        };
+        // The cosine of half an angle: 0.05 rad.
+        near += usize::from(found.all.iter().map(off).fold(f64::INFINITY, f64::min) < 3e-4);
+    }
+    assert!(near >= 8, "{near} of 10");
+}
+
+#[test]
+fn degrees_and_rounds_have_their_limits() {
+    // A degree that exponents cannot hold, although it has few monomials.
+    let high = system(&[&[(1.0, [200]), (1.0, [1]), (-1.0, [0])]]);
+    let error = solve(&high, &Options::default()).unwrap_err();
+    assert_eq!(error, SolveError::TooLarge { monomials: 401, limit: 1_000 });
+    // A curve is named as soon as it shows, also where no round is left to see it twice.
+    let circle = [(1.0, [2, 0]), (1.0, [0, 2]), (-1.0, [0, 0])];
+    let twice = circle.map(|(c, e)| (2.0 * c, e));
+    let circles = system(&[&circle, &twice]);
+    let errors: Vec<_> = (0..4)
+        .map(|max_rounds| solve(&circles, &Options { max_rounds, ..Options::default() }).unwrap_err())
+        .collect();
+    assert!(matches!(errors[0], SolveError::TooManySolutions { rounds: 0, .. }), "{}", errors[0]);
+    assert!(errors[1].to_string().contains("one round"), "{}", errors[1]);
+    assert!(matches!(errors[3], SolveError::NotZeroDimensional { .. }), "{}", errors[3]);
+}
+
+#[test]
+fn a_point_without_derivatives_stays_where_it_is() {
+    let circles = system(&[&[(1.0, [2, 0]), (-1.0, [0, 0])], &[(1.0, [0, 2]), (-4.0, [0, 0])]]);
+    let polished = newton::polish(&circles, real(&[0.0, 0.0]), false).unwrap();
+    assert_eq!(polished.x, real(&[0.0, 0.0]));
+    assert!(polished.regularity <= 0.0 && (polished.residual - 1.0).abs() < 1e-12, "{polished:?}");
+    let polished = newton::polish(&circles, real(&[0.9, 2.2]), false).unwrap();
+    assert!(distance(&polished.x, &real(&[1.0, 2.0])) < 1e-12 && polished.regularity > 0.1);
+    let mut none = real(&[0.0, 0.0]);
+    newton::normalize(&mut none);
+    assert_eq!(none, real(&[0.0, 0.0]));
+    // Where every term vanishes nothing is left.
+    let product = system(&[&[(1.0, [1, 1]), (3.0, [2, 1])], &[(2.0, [1, 0])]]);
+    assert!(product.equations()[0].relative_residual(&real(&[0.0, 5.0])) <= 0.0);
+    assert!(product.equations()[0].relative_residual(&real(&[1.0, 5.0])) > 0.9);
+}

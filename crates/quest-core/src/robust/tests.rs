@@ -484,3 +484,66 @@ fn a_fisheye_camera_sees_behind_itself() {
     assert!(r < 0.3 && t < 2.0, "{r} {t}");
     assert!(found.inlier_count > 75);
 }
+
+#[test]
+fn few_matches_take_scores_limits_and_a_cancellation_too() {
+    for points in [6, 8, 14, 25] {
+        let (scene, _) = scene(&noisy(points), 0.0, 140);
+        let all = estimate(&scene.matches, &options()).unwrap();
+        // Scores of so few matches lead to no other pose.
+        let scores: Vec<f64> = (0..points).map(|k| (k as f64).sin()).collect();
+        let priors = Priors { scores: Some(&scores), ..Priors::default() };
+        let found = estimate_with(&scene.matches, &options(), &priors).unwrap();
+        assert!(found.pose.rotation_error(&all.pose) < 2e-2, "{points}: {found:?}");
+        // No more samples are drawn than may be.
+        for max_iterations in [1, 5, 40] {
+            let few = Options { min_iterations: 0, max_iterations, ..options() };
+            if let Ok(found) = estimate(&scene.matches, &few) {
+                assert!(found.iterations <= max_iterations, "{points}: {}", found.iterations);
+            }
+        }
+        let cancelled = estimate_until(&scene.matches, &options(), &Priors::default(), &|| true);
+        assert_eq!(cancelled.unwrap_err(), EstimateError::Cancelled, "{points}");
+        // One that comes after some samples ends the search as well.
+        let asked = std::sync::atomic::AtomicUsize::new(0);
+        let later = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 0;
+        let cancelled = estimate_until(&scene.matches, &options(), &Priors::default(), &later);
+        assert_eq!(cancelled.unwrap_err(), EstimateError::Cancelled, "{points}");
+    }
+}
+
+#[test]
+fn focal_lengths_that_are_not_finite_are_refused() {
+    let (scene, _) = scene(&noisy(20), 0.0, 141);
+    for bad in [f64::NAN, f64::INFINITY, -500.0] {
+        for which in 0..4 {
+            let mut focal_lengths = [[FOCAL_LENGTH; 2]; 2];
+            focal_lengths[which / 2][which % 2] = bad;
+            let error = estimate(&scene.matches, &Options { focal_lengths, ..options() }).unwrap_err();
+            assert!(error.to_string().contains("focal length"), "{error}");
+        }
+    }
+    // A direction whose length overflows.
+    let up = KnownDirection { in_view1: Vector3::y() * 1e300, in_view2: Vector3::y(), tolerance: 0.1 };
+    let long = KnownDirection { in_view2: Vector3::repeat(f64::MAX), ..up };
+    let priors = Priors { direction: Some(long), ..Priors::default() };
+    let error = estimate_with(&scene.matches, &options(), &priors).unwrap_err();
+    assert!(error.to_string().contains("length of the known direction is inf"), "{error}");
+}
+
+#[test]
+fn a_few_that_moved_beside_many_that_did_not_are_false() {
+    let (scene, _) = scene(&noisy(60), 0.0, 142);
+    let mut matches: Vec<_> = scene.matches[..57]
+        .iter()
+        .map(|m| {
+            let [u, v] = [m.bearing1().x / m.bearing1().z, m.bearing1().y / m.bearing1().z];
+            Correspondence::from_image_points([u, v], [u, v]).unwrap()
+        })
+        .collect();
+    matches.extend_from_slice(&scene.matches[57..]);
+    let found = estimate(&matches, &options()).unwrap();
+    assert!(found.pose.q_21.angle() < 1e-9 && found.unmoved == 0, "{found:?}");
+    // One of the others may lie on its epipolar line by chance.
+    assert!(found.inliers[..57].iter().all(|is| *is) && found.inlier_count < 60, "{found:?}");
+}

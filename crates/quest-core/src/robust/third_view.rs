@@ -260,4 +260,30 @@ mod tests {
             assert!(three >= two, "{points} points: {three}, each pair alone {two}");
         }
     }
+
+    #[test]
+    fn views_with_few_points_in_common_have_the_poses_of_their_pairs() {
+        let options = Options { threshold: 1.5, focal_lengths: [[FOCAL_LENGTH; 2]; 2], ..Options::default() };
+        let (truth, [m21, _]) = triple(40, 0.3, 900);
+        // Another scene: no bearing of view 1 is in both lists.
+        let (other, [m31, _]) = triple(40, 0.3, 901);
+        let found = estimate_with_third_view(&m21, &options, &m31, &options).unwrap();
+        assert!(found.choice.is_none());
+        assert!(found.estimate_21.pose.rotation_error(&truth[0]) < 0.02);
+        assert!(found.estimate_31.pose.rotation_error(&other[0]) < 0.02);
+        // Two points in common are too few to choose by.
+        let mut shared = m31.clone();
+        shared[..2].copy_from_slice(&m21[..2]);
+        let found = estimate_with_third_view(&m21, &options, &shared, &options).unwrap();
+        assert!(found.choice.is_none());
+        assert!(found.estimate_31.pose.rotation_error(&other[0]) < 0.02);
+        // A pair without any pose has its own reason, on either side.
+        let none = vec![m21[0]; 20];
+        let reason = estimate(&none, &options, Answer::Best).unwrap_err();
+        for (a, b) in [(&m21, &none), (&none, &m21)] {
+            assert_eq!(estimate_with_third_view(a, &options, b, &options).unwrap_err(), reason);
+        }
+        // Four matches are refused before anything else.
+        assert!(estimate_with_third_view(&m21[..4], &options, &m31, &options).is_err());
+    }
 }

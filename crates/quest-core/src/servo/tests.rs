@@ -260,3 +260,116 @@ fn turns_do_not_push_features_out() {
     assert!((turn([-0.6, 0.0], [-0.55, 0.0], 0.2) - 0.2).abs() < 1e-15);
     assert!(turn([0.0, 0.0], [0.55, 0.0], -0.2) > 0.1);
 }
+
+/// A law that stands still.
+#[derive(Clone, Debug)]
+struct Still;
+
+impl ControlLaw for Still {
+    fn command(&mut self, _: &RelativePose) -> Twist {
+        Twist::zero()
+    }
+}
+
+/// The records of a camera that stands still at a robot's start, with these disturbances.
+fn standing(disturbances: &Disturbances, images: usize) -> (World, Vec<Record>) {
+    let rng = &mut scenario::generator(21, 0);
+    let (world, mut plant) = robot(rng, 20, disturbances);
+    let goal = world.on_plane(&world.goal_pixels(rng));
+    let servo = Servo::new(&goal, filter(&world, &goal, Some(PLANE)), Still, Safety::new(LIMITS));
+    let all = records(&world, &mut plant, servo, images, rng);
+    (world, all)
+}
+
+#[test]
+fn disturbances_do_what_they_say() {
+    let (world, exact) = standing(&Disturbances::default(), 30);
+    assert_eq!(exact.len(), 30);
+    let true_pixels = &exact[0].pixels;
+    assert!(true_pixels.iter().all(Option::is_some) && exact.iter().all(|r| r.pixels == *true_pixels));
+    // Nothing comes before the first image has come through.
+    let (_, late) = standing(&Disturbances { delay: 3, ..Disturbances::default() }, 30);
+    for (index, record) in late.iter().enumerate() {
+        let is_there = record.pixels.iter().all(Option::is_some);
+        assert!(is_there == (index >= 3) && record.pixels.iter().any(Option::is_some) == is_there, "{index}");
+    }
+    assert_eq!(late[3].pixels, *true_pixels);
+    // One feature in five elsewhere in the image; one image in four from somewhere else.
+    let changed = |records: &[Record]| {
+        let count = |r: &Record| r.pixels.iter().zip(true_pixels).filter(|(a, b)| a != b).count();
+        records.iter().map(count).collect::<Vec<_>>()
+    };
+    let (_, some) = standing(&Disturbances { outliers: 0.2, ..Disturbances::default() }, 100);
+    let share = changed(&some).iter().sum::<usize>() as f64 / 2_000.0;
+    assert!((share - 0.2).abs() < 0.05, "{share}");
+    let (width, height) = world.camera.size().unwrap();
+    let is_inside =
+        |[u, v]: &[f64; 2]| (0.0..f64::from(width)).contains(u) && (0.0..f64::from(height)).contains(v);
+    assert!(some.iter().flat_map(|r| r.pixels.iter().flatten()).all(is_inside));
+    let (_, wrong) = standing(&Disturbances { wrong_images: 0.25, ..Disturbances::default() }, 200);
+    let counts = changed(&wrong);
+    assert!(counts.iter().all(|count| [0, 20].contains(count)), "{counts:?}");
+    let share = counts.iter().filter(|count| **count > 0).count() as f64 / 200.0;
+    assert!((share - 0.25).abs() < 0.1, "{share}");
+}
+
+#[test]
+fn who_watches_a_run_may_end_it() {
+    let rng = &mut scenario::generator(22, 0);
+    let (world, mut plant) = robot(rng, 20, &Disturbances::default());
+    let goal = world.on_plane(&world.goal_pixels(rng));
+    let mut servo = Servo::new(&goal, filter(&world, &goal, Some(PLANE)), Still, Safety::new(LIMITS));
+    let mut times = Vec::new();
+    world.run(&mut plant, &mut servo, 50, rng, |record| {
+        times.push(record.time);
+        times.len() < 7
+    });
+    assert_eq!(times.len(), 7);
+    assert!(times.iter().enumerate().all(|(k, time)| (time - 0.1 * k as f64).abs() < 1e-12));
+}
+
+#[test]
+fn a_camera_without_a_size_sees_all_that_is_in_front() {
+    let (mut world, _) = scenario::paper();
+    let camera = crate::Camera::new(world.camera.model(), world.camera.params()).unwrap();
+    let aside = RelativePose::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::x() * 9.0);
+    assert!(!world.sees_all(&aside, 0.0) && world.seen_from(&aside) == 0);
+    world.camera = camera;
+    assert!(world.sees_all(&aside, 15.0) && world.seen_from(&aside) == 5 && world.border(15.0).is_none());
+    let behind = RelativePose::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::z() * -9.0);
+    assert!(!world.sees_all(&behind, 0.0) && world.seen_from(&behind) == 0);
+}
+
+#[test]
+fn a_start_before_a_plane_is_mirrored() {
+    let (general, coplanar) =
+        (scenario::robot_start(Features::General), scenario::robot_start(Features::Coplanar));
+    assert!((general.x + coplanar.x).abs() < 1e-15 && (general.heading + coplanar.heading).abs() < 1e-15);
+    assert!((general.z - coplanar.z).abs() < 1e-15 && general.x > 0.0);
+}
+
+/// A tracker that knows the plane of its base brings the robot to its goal, with few features and with many.
+#[test]
+fn robots_arrive_with_a_tracker_that_knows_their_plane() {
+    for (count, seed) in [(8, 23), (20, 24), (150, 25)] {
+        let rng = &mut scenario::generator(seed, 0);
+        let disturbances = Disturbances { noise_px: 0.5, ..Disturbances::default() };
+        let (world, mut plant) = robot(rng, count, &disturbances);
+        let goal = world.on_plane(&world.goal_pixels(rng));
+        let options = FilterOptions { plane: Some(PLANE), ..world.filter_options(&LIMITS, 2.0) };
+        let tracker = Tracker::new(&goal, SolverName::Quest, options);
+        let safety = Safety { border: world.border(15.0), ..Safety::new(LIMITS) };
+        let rig = Rig { unit: 2.0, period: world.period, ..Rig::default() };
+        let servo = Servo::new(&goal, tracker, DifferentialDriveLaw::default(), safety).with_rig(rig);
+        let all = records(&world, &mut plant, servo, 400, rng);
+        assert!(plant.x.hypot(plant.z) < 0.03, "{count}: {plant:?}");
+        assert!(plant.heading.abs().to_degrees() < 1.0, "{count}: {plant:?}");
+        // It keeps to its plane on the way.
+        for record in &all {
+            if let Ok(Estimate { pose, support: Support::Full, .. }) = record.step.estimate {
+                let tilt = (pose.q_21 * nalgebra::Vector3::y() - nalgebra::Vector3::y()).norm();
+                assert!(tilt < 0.02 && pose.t_21.y.abs() < 0.01, "{count}, {}: {pose:?}", record.time);
+            }
+        }
+    }
+}

@@ -101,4 +101,10 @@ mod tests {
             assert_eq!(image.map(f64::to_bits), [quotient(x2), quotient(y2)].map(f64::to_bits));
         }
     }
+
+    #[test]
+    fn a_point_beside_the_camera_has_an_image_at_infinity() {
+        let image = image2(&UnitQuaternion::identity(), &Vector3::zeros(), &Vector3::new(2.0, -3.0, 0.0));
+        assert!(image[0] > 0.0 && image[1] < 0.0 && image.iter().all(|x| x.is_infinite()), "{image:?}");
+    }
 }

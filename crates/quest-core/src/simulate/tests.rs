@@ -260,3 +260,34 @@ fn further_points_belong_to_the_scene_and_leave_it_as_it_is() {
         }
     }
 }
+
+#[test]
+fn boxes_and_noise_that_are_none_are_refused() {
+    let refused = |options: &SceneOptions| Scene::generate(options, SEED, 0).unwrap_err();
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for axis in 0..3 {
+            for end in 0..2 {
+                let mut boxes = Boxes::default();
+                boxes.points[axis][end] = bad;
+                let error = refused(&SceneOptions { boxes, ..SceneOptions::default() });
+                assert!(matches!(error, SceneError::PointsBox { .. }), "{axis} {end} {bad}: {error}");
+            }
+        }
+    }
+    for noise_px in [-0.1, f64::NAN, f64::NEG_INFINITY] {
+        let error = refused(&SceneOptions { noise_px, ..SceneOptions::default() });
+        assert!(matches!(error, SceneError::Noise { .. }), "{noise_px}: {error}");
+    }
+}
+
+#[test]
+fn figures_vary_what_they_are_of_over_a_hundred_steps() {
+    for (figure, number) in Figure::ALL.into_iter().zip(4..) {
+        assert_eq!(figure.number(), number);
+        let cells = figure.cells(&SceneOptions::default());
+        assert_eq!(cells.len(), 101);
+        let scenes = cells.len() * figure.trials() as usize;
+        assert_eq!(scenes, if figure.varies_parallax() { 4_040 } else { 10_100 }, "{number}");
+        assert_eq!(figure.varies_parallax(), number == 6);
+    }
+}

@@ -251,3 +251,153 @@ impl FromStr for SolverName {
         found.ok_or_else(|| UnknownSolver { found: name.to_owned() })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Scene, SceneOptions};
+    use crate::{CandidateKind, Degeneracy};
+
+    fn solved(solver: SolverName, kinds: Kinds, matches: &[Correspondence]) -> Candidates {
+        let mut found = Candidates::new();
+        // What was in the list before has no say.
+        found.set_degeneracy(Degeneracy::PureRotation);
+        solver.solve(kinds, matches, &mut found);
+        found
+    }
+
+    #[test]
+    fn every_solver_says_why_it_has_no_pose() {
+        let scene =
+            Scene::generate(&SceneOptions { points: 12, ..SceneOptions::realistic() }, 31, 0).unwrap();
+        for solver in SolverName::named() {
+            let least = solver.info().min_matches;
+            for kinds in Kinds::CHOICES {
+                let name = format!("{}, {}", solver.info().name, kinds.name());
+                for few in 0..least {
+                    let found = solved(solver, kinds, &scene.matches[..few]);
+                    assert_eq!(found.degeneracy(), Some(Degeneracy::TooFewMatches), "{name}: {few}");
+                    assert!(found.is_empty(), "{name}: {few}");
+                }
+                // One match and the same again.
+                let found = solved(solver, kinds, &[scene.matches[0]; 12]);
+                assert!(found.is_empty() && found.degeneracy().is_some(), "{name}: {found:?}");
+                // One match less than it takes, and one of them again.
+                let mut doubled = scene.matches[..least].to_vec();
+                doubled[least - 1] = doubled[0];
+                let found = solved(solver, kinds, &doubled);
+                assert!(found.is_empty() && found.degeneracy().is_some(), "{name}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_motions_of_a_plane_are_added_where_they_are_asked_for() {
+        let plane = SceneOptions {
+            points: 12,
+            layout: crate::simulate::Layout::Coplanar,
+            ..SceneOptions::realistic()
+        };
+        for index in 0..10 {
+            let scene = Scene::generate(&plane, 32, index).unwrap();
+            for solver in SolverName::named() {
+                for kinds in Kinds::CHOICES {
+                    let found = solved(solver, kinds, &scene.matches[..5]);
+                    let name = format!("{}, {}, scene {index}", solver.info().name, kinds.name());
+                    assert!(found.len() <= solver.most_candidates(kinds), "{name}: {}", found.len());
+                    let planar = found.iter().filter(|c| c.kind == CandidateKind::Planar);
+                    assert!(
+                        kinds == Kinds::Planar || solver == SolverName::Homography || planar.count() == 0,
+                        "{name}"
+                    );
+                }
+                assert!(solver.most_candidates(Kinds::Planar) >= solver.most_candidates(Kinds::All));
+                assert!(solver.most_candidates(Kinds::Planar) <= Candidates::CAPACITY);
+            }
+            let found = solved(SolverName::Quest, Kinds::Planar, &scene.matches[..5]);
+            let is_true = |c: &crate::Candidate| c.pose.rotation_error(&scene.truth) < 1e-5;
+            assert!(found.iter().any(is_true), "scene {index}");
+        }
+    }
+
+    #[test]
+    fn cameras_that_only_turn_have_their_rotation_and_no_translation() {
+        let turn = nalgebra::UnitQuaternion::new(nalgebra::Vector3::new(0.2, -0.3, 0.4));
+        let scene =
+            Scene::generate(&SceneOptions { points: 12, ..SceneOptions::realistic() }, 33, 0).unwrap();
+        let turned = |m: &Correspondence| {
+            Correspondence::from_bearings((*m.bearing1()).into(), (turn * m.bearing1()).into()).unwrap()
+        };
+        let all: Vec<_> = scene.matches.iter().map(turned).collect();
+        for solver in SolverName::named() {
+            for kinds in Kinds::CHOICES {
+                for count in [solver.info().min_matches, 12] {
+                    let found = solved(solver, kinds, &all[..count]);
+                    let name = format!("{}, {}, {count}", solver.info().name, kinds.name());
+                    assert_eq!(found.degeneracy(), Some(Degeneracy::PureRotation), "{name}");
+                    assert_eq!(found.len(), 1, "{name}");
+                    assert_eq!(
+                        (found[0].kind, found[0].in_front),
+                        (CandidateKind::RotationOnly, count),
+                        "{name}"
+                    );
+                    assert!(found[0].pose.q_21.angle_to(&turn) < 1e-12, "{name}");
+                    assert!(found[0].pose.t_21.norm() <= 0.0, "{name}");
+                }
+            }
+        }
+        // Where four points of five are at infinity, the direction of the translation is open: whichever is the near one.
+        for near in 0..5 {
+            let mut five = all[..5].to_vec();
+            five[near] = Correspondence::from_bearings([0.1, 0.2, 1.0], [0.5, -0.3, 1.0]).unwrap();
+            let found = solved(SolverName::Quest, Kinds::All, &five);
+            assert_eq!(found.degeneracy(), Some(Degeneracy::RankDeficient), "{near}: {found:?}");
+            assert!(found.is_empty(), "{near}");
+        }
+    }
+
+    #[test]
+    fn the_true_pose_of_a_symmetric_scene_is_found() {
+        use nalgebra::{UnitQuaternion, Vector3};
+        // Corners of a square and a point on its axis: solutions come in groups, and some of them run together.
+        let points =
+            [[1.0, 1.0, 4.0], [-1.0, 1.0, 4.0], [-1.0, -1.0, 4.0], [1.0, -1.0, 4.0], [0.0, 0.0, 3.0]];
+        let quarter = std::f64::consts::FRAC_PI_2;
+        for turn in [[0.0; 3], [0.0, 0.2, 0.0], [0.0, 0.0, quarter], [0.1, 0.1, 0.0]] {
+            for t_21 in [[0.5, 0.0, 0.0], [0.0, 0.4, 0.0], [0.3, 0.3, 0.0], [0.3, -0.2, 0.4]] {
+                let truth = crate::RelativePose::new(UnitQuaternion::new(turn.into()), t_21.into());
+                let matches = points.map(|x1| {
+                    let x2 = truth.q_21 * Vector3::from(x1) + truth.t_21;
+                    Correspondence::from_bearings(x1, x2.into()).unwrap()
+                });
+                for solver in
+                    [SolverName::Quest, SolverName::Nister, SolverName::Stewenius, SolverName::LiHartley]
+                {
+                    let found = solved(solver, Kinds::All, &matches);
+                    let off = |c: &crate::Candidate| c.pose.rotation_error(&truth);
+                    let least = found.iter().map(off).fold(f64::INFINITY, f64::min);
+                    // A double solution has half of the digits.
+                    assert!(least < 1e-5, "{}, {turn:?}, {t_21:?}: {least}", solver.info().name);
+                    assert!(found.iter().all(|c| c.pose.q_21.coords.iter().all(|x| x.is_finite())));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_on_a_line_of_both_views_have_no_pose() {
+        let on_line = |k: u32| {
+            let s = 0.1 * f64::from(k) - 0.3;
+            Correspondence::from_image_points([s, 0.5 * s + 0.1], [0.8 * s + 0.1 * s * s, 0.2]).unwrap()
+        };
+        let matches: Vec<_> = (0..12).map(on_line).collect();
+        for solver in SolverName::named() {
+            for count in [solver.info().min_matches, 12] {
+                let found = solved(solver, Kinds::All, &matches[..count]);
+                let name = solver.info().name;
+                assert!(found.is_empty(), "{name}, {count}: {found:?}");
+                assert_eq!(found.degeneracy(), Some(Degeneracy::Collinear), "{name}, {count}");
+            }
+        }
+    }
+}

@@ -134,4 +134,51 @@ mod tests {
         assert!(eigenvalues(&mut a).is_none());
         assert_eq!(eigenvalues(&mut [[0.0; 4]; 4]).unwrap(), [Complex::new(0.0, 0.0); 4]);
     }
+
+    #[test]
+    fn what_is_not_finite_has_no_eigenvalues() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for (row, column) in [(0, 0), (3, 1), (1, 3)] {
+                let mut a = [[1.0; 4]; 4];
+                a[row][column] = bad;
+                assert!(Hessenberg::new(a).is_none() && eigenvalues(&mut a).is_none(), "{bad}");
+            }
+        }
+    }
+
+    #[test]
+    fn balancing_is_a_similarity_however_far_rows_and_columns_are_apart() {
+        // The last one is further apart than a factor may be: 1e100.
+        for size in [1.0, 1e10, 1e100, 1e150, 1e250] {
+            for (high, low) in [(size, 1.0 / size), (1.0 / size, size)] {
+                let before = [[2.0, high], [low, -3.0]];
+                let mut after = before;
+                let scales = balance(&mut after);
+                for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    // The scales are powers of two, so that nothing is rounded.
+                    let expected = before[i][j] * (scales[j] / scales[i]);
+                    assert_eq!(after[i][j].to_bits(), expected.to_bits(), "{size} {scales:?}");
+                }
+                assert!((after[0][1] / after[1][0]).abs().ln().abs() <= (high / low).ln().abs(), "{size}");
+            }
+        }
+        // A column or a row of zeros has no scale.
+        let mut triangular = [[1.0, 1e9], [0.0, 2.0]];
+        assert!(balance(&mut triangular).iter().all(|scale| scale.to_bits() == 1.0_f64.to_bits()));
+    }
+
+    #[test]
+    fn triangular_matrices_have_their_diagonal_and_its_vectors() {
+        let a = [[1.0, 0.5, -0.3, 2.0], [0.0, 2.0, 0.7, -1.0], [0.0, 0.0, -3.0, 0.4], [0.0, 0.0, 0.0, 5.0]];
+        let form = Hessenberg::new(a).unwrap();
+        for (k, value) in form.eigenvalues().unwrap().into_iter().enumerate() {
+            assert!((value - a[k][k]).norm() < 1e-14, "{value}");
+            let x = form.eigenvector(a[k][k]).unwrap();
+            let size = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            for (row, own) in a.iter().zip(x) {
+                let product: f64 = row.iter().zip(x).map(|(a, x)| a * x).sum();
+                assert!((product - a[k][k] * own).abs() < 1e-14 * size, "{k}");
+            }
+        }
+    }
 }

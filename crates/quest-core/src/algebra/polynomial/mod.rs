@@ -112,4 +112,34 @@ mod tests {
         assert!(!real_roots(&p).certain);
         assert!(!real_roots(&[0.0; 11]).certain);
     }
+
+    #[test]
+    fn what_is_not_a_number_does_not_become_one() {
+        let mut out = [Complex::new(0.0, 0.0); 11];
+        assert_eq!(complex_roots(&[f64::NAN; 11], &[], &mut out), 0);
+    }
+
+    #[test]
+    fn a_chain_ends_where_a_root_is_exactly_multiple_or_too_far_out() {
+        // x⁴ and (x − 1)² leave nothing behind their first member.
+        assert!(sturm::Chain::new(&[0.0, 0.0, 0.0, 0.0, 1.0]).is_none());
+        assert!(sturm::Chain::new(&[1.0, -2.0, 1.0]).is_none());
+        // (x − 1)(x − r), whose second root may be one at infinity.
+        for (root, counted) in [(1e3, 2.0), (1e11, 2.0), (1e15, 1.0)] {
+            let chain = sturm::Chain::new(&[root, -(1.0 + root), 1.0]).unwrap();
+            let [from, _] = chain.ends([0.0; 2]);
+            let to = chain.bound(1.0, from).unwrap();
+            assert!((from.changes - to.changes - counted).abs() < 0.5, "{root}: {}", to.x);
+            assert!(to.x < 1e13 && chain.bound(-1.0, from).is_none(), "{root}: {}", to.x);
+        }
+    }
+
+    #[test]
+    fn complex_roots_that_are_double_stay_where_they_were_found() {
+        // (x² + 1)² has no slope at its roots.
+        let mut out = [Complex::new(0.0, 0.0); 5];
+        assert_eq!(complex_roots(&[1.0, 0.0, 2.0, 0.0, 1.0], &[], &mut out), 2);
+        // Half of the digits are left of a double root.
+        assert!(out[..2].iter().all(|z| (z - Complex::new(0.0, 1.0)).norm() < 1e-7), "{out:?}");
+    }
 }

@@ -1,8 +1,9 @@
 //! Every error, and what it says.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{Camera, CameraError, CameraModel};
+use crate::camera::prism::Prism;
 
 fn pinhole() -> Camera {
     Camera::new(CameraModel::Pinhole, &[100.0, 100.0, 50.0, 50.0]).unwrap()
@@ -86,8 +87,10 @@ fn coefficients_of_opencv_are_counted() {
 
 #[test]
 fn an_image_without_pixels_is_refused() {
-    let error = pinhole().with_size(640, 0).unwrap_err();
-    assert_eq!(error.to_string(), "the size of the image is 640 x 0, expected at least 1 x 1");
+    for (width, height) in [(640, 0), (0, 480), (0, 0)] {
+        let error = pinhole().with_size(width, height).unwrap_err().to_string();
+        assert_eq!(error, format!("the size of the image is {width} x {height}, expected at least 1 x 1"));
+    }
 }
 
 #[test]
@@ -110,9 +113,19 @@ fn points_that_are_not_in_front_are_refused() {
     // In front, but so far to the side that the quotient overflows.
     let error = pinhole().project(&Vector3::new(1e200, 0.0, 1e-200)).unwrap_err();
     assert!(matches!(error, CameraError::PointOutOfDomain { found, .. } if found.is_finite()), "{error}");
+    assert!(error.to_string().contains("from the optical axis (on the plane z = 1)"), "{error}");
 
     let fisheye = Camera::new(CameraModel::SimpleRadialFisheye, &[100.0, 50.0, 50.0, 0.0]).unwrap();
     for x in [Vector3::zeros(), -Vector3::z()] {
         assert_eq!(fisheye.project(&x), Err(CameraError::NoDirection));
+    }
+}
+
+#[test]
+fn what_is_not_a_number_is_not_undistorted() {
+    for prism in [Prism::thin([0.0; 8]), Prism::radial_tangential([0.0; 12])] {
+        assert_eq!(prism.undistort(&Vector2::new(f64::NAN, 0.1)), None);
+        let x = Vector2::new(0.3, -0.2);
+        assert!((prism.undistort(&x).unwrap() - x).norm() < 1e-12);
     }
 }

@@ -141,6 +141,14 @@ mod tests {
             joint_velocities(&twist, &[[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]], 0.05, &limits, &mut out);
             assert!((out[0] - expected).abs() < 1e-12, "{out:?}");
         }
+        // An arm that is not finite has no velocities either.
+        for bad in [f64::NAN, f64::INFINITY] {
+            let mut arm = jacobian();
+            arm[3][2] = bad;
+            out.fill(1.0);
+            assert!(joint_velocities(&twist, &arm, 0.05, &free, &mut out) <= 0.0);
+            assert!(out.iter().all(|s| *s == 0.0));
+        }
         let bad = Twist { linear: Vector3::repeat(f64::NAN), ..twist };
         assert!(joint_velocities(&bad, &jacobian(), 0.05, &free, &mut out) <= 0.0);
         assert!(out.iter().all(|s| *s == 0.0));

@@ -218,4 +218,27 @@ mod tests {
             assert!((command.unwrap().linear - Vector3::y() * expected).amax() < 1e-12, "{command:?}");
         }
     }
+
+    #[test]
+    fn an_exploration_that_has_begun_is_not_ended_by_a_turn_and_one_without_direction_is() {
+        let safety = Safety::new(Limits { speed: 0.3, turn_rate: 1.0 });
+        let direction = Twist { linear: Vector3::x(), ..Twist::zero() };
+        let mut exploration = Exploration::default();
+        let mut command =
+            |direction: &Twist, angle: f64| exploration.command(direction, angle, 0.04, &safety, 0.1);
+        // A turn that is not done yet lets it wait.
+        assert!((0..8).all(|_| command(&direction, 0.0).is_none()));
+        assert!(command(&direction, 0.1).is_none());
+        assert!((0..8).all(|_| command(&direction, 0.0).is_none()));
+        assert!(command(&direction, 0.0).is_some());
+        // On its way it goes on, whatever the rotation shows.
+        assert!((0..3).all(|_| command(&direction, 0.1).is_some()));
+        assert!(command(&direction, 0.1).is_none());
+        assert!(exploration.take_end() && !exploration.take_end());
+        assert_eq!(exploration.tries, 1);
+        // A law that knows no direction ends it at once.
+        assert!((0..9).all(|_| exploration.command(&Twist::zero(), 0.0, 0.04, &safety, 0.1).is_none()));
+        assert!(exploration.take_end());
+        assert_eq!(exploration.tries, 2);
+    }
 }

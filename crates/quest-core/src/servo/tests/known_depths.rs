@@ -134,3 +134,198 @@ fn a_law_behind_a_reference_is_the_same_law() {
     ControlLaw::reset(&mut behind);
     assert_eq!(other, law);
 }
+
+fn still() -> Motion {
+    Motion { linear: Vector3::zeros(), angular: Vector3::zeros() }
+}
+
+#[test]
+fn depths_that_say_nothing_leave_a_filter_to_its_images() {
+    let points = points(12);
+    let (goal, truth) = (goal(&points), pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]));
+    let image = seen(&points, &truth);
+    // None known, all infinitely far, all so near that the mean of their inverses is infinite.
+    for depth in [f64::NAN, f64::INFINITY, -1.0, 0.0, 1e-320] {
+        let mut filter = DepthFilter::new(&goal, SolverName::Quest, FilterOptions::default());
+        filter.set_depths_each(&[depth; 12], &[0.01; 12]);
+        if depth.is_nan() || depth > 0.0 {
+            filter.reset();
+            assert_eq!(filter.estimate(&image).unwrap_err(), HoldReason::Starting, "{depth}");
+            assert_eq!(filter.depths().count(), 0, "{depth}");
+        }
+        filter.set_depths(&[depth; 12], 0.01);
+        assert_eq!(filter.estimate(&image).unwrap_err(), HoldReason::Starting, "{depth}");
+        let mut tracker = Tracker::new(&goal, SolverName::Quest, FilterOptions::default());
+        tracker.set_depths(&[depth; 12], 0.01);
+        assert_eq!(tracker.estimate(&image).unwrap_err(), HoldReason::Starting, "{depth}");
+        assert!(tracker.depths().all(f64::is_nan), "{depth}");
+    }
+    // One without depths that is reset has none either.
+    let mut filter = DepthFilter::new(&goal, SolverName::Quest, FilterOptions::default());
+    filter.reset();
+    assert_eq!((filter.depths().count(), filter.hypotheses()), (0, 0));
+}
+
+#[test]
+fn a_filter_starts_with_the_depths_it_knows_and_one_that_it_does_not() {
+    let points = points(12);
+    let (goal, truth) = (goal(&points), pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]));
+    let mut depths: Vec<f64> = points.iter().map(|x| 1e3 * x.z).collect();
+    depths[5] = f64::NAN;
+    let mut filter = DepthFilter::new(&goal, SolverName::Quest, FilterOptions::default());
+    filter.set_depths_each(&depths, &[0.01; 12]);
+    let found = settled(&mut filter, &seen(&points, &truth));
+    // The unit is the mean of all depths, of which one is a guess.
+    assert!(found.rotation_error(&truth) < 1e-2, "{found:?}");
+    assert!(found.t_21.angle(&truth.t_21) < 0.05, "{found:?}");
+    let precisions: Vec<f64> = filter.depth_precisions().collect();
+    assert!(
+        precisions.iter().enumerate().all(|(k, p)| (*p < 0.05) == (k != 5) || *p < 0.05),
+        "{precisions:?}"
+    );
+}
+
+#[test]
+fn features_that_are_not_seen_at_first_keep_the_depths_that_were_given() {
+    let truth = pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]);
+    for count in [10, 40, 130] {
+        let points = points(count);
+        let (goal, unit) = (goal(&points), unit(&points));
+        let mut tracker = Tracker::new(&goal, SolverName::Quest, FilterOptions::default());
+        tracker.set_depths(&points.iter().map(|x| x.z).collect::<Vec<_>>(), 0.01);
+        let mut image = seen(&points, &truth);
+        (image[2], image[7]) = (None, None);
+        assert!(is_near(&settled(&mut tracker, &image), &truth, unit), "{count}");
+        for k in 0..30 {
+            tracker.moved(&still());
+            let found = tracker.estimate(&image).unwrap();
+            assert!(is_near(&found.pose, &truth, unit), "{count}, image {k}: {found:?}");
+        }
+        assert!(!tracker.inliers()[2] && !tracker.inliers()[7]);
+        for k in [2, 7] {
+            let depth = tracker.depths().nth(k).unwrap();
+            assert!((depth * unit / points[k].z - 1.0).abs() < 0.02, "{count}, {k}: {depth}");
+        }
+        // They count as soon as they are seen.
+        tracker.moved(&still());
+        let found = tracker.estimate(&seen(&points, &truth)).unwrap();
+        assert_eq!(found.inliers, points.len(), "{count}");
+    }
+}
+
+#[test]
+fn a_filter_finds_a_camera_that_was_carried_away() {
+    let before = pose([0.0, 0.05, 0.0], [0.1, 0.0, 0.2]);
+    let after = pose([0.1, -0.1, 0.9], [-0.3, 0.2, 0.4]);
+    let points = points(12);
+    let (goal, unit) = (goal(&points), unit(&points));
+    let mut filter = DepthFilter::new(&goal, SolverName::Quest, FilterOptions::default());
+    filter.set_depths(&points.iter().map(|x| x.z).collect::<Vec<_>>(), 0.01);
+    assert!(is_near(&settled(&mut filter, &seen(&points, &before)), &before, unit));
+    let found: Vec<_> = (0..40).map(|_| filter.estimate(&seen(&points, &after))).collect();
+    assert!(found.iter().flatten().all(|found| is_near(&found.pose, &after, unit)), "{found:?}");
+    assert!(found[0].is_err() && found[39].is_ok(), "{found:?}");
+}
+
+/// Image after image, with a little noise, of a camera that is not commanded.
+fn shown(
+    tracker: &mut Tracker<SolverName>,
+    points: &[Vector3<f64>],
+    pose: &RelativePose,
+    images: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Result<Estimate, HoldReason>> {
+    let mut all = Vec::new();
+    for _ in 0..images {
+        let mut image = seen(points, pose);
+        for x in image.iter_mut().flatten().flatten() {
+            *x += rng.random_range(-1e-3..1e-3);
+        }
+        tracker.moved(&still());
+        all.push(tracker.estimate(&image));
+    }
+    all
+}
+
+#[test]
+fn a_camera_that_only_turned_begins_anew_once_it_is_carried_aside_or_lost() {
+    let turned = pose([0.1, 0.25, -0.2], [0.0; 3]);
+    let points = points(30);
+    let rng = &mut scenario::generator(26, 0);
+    let mut tracker = Tracker::new(&goal(&points), SolverName::Quest, FilterOptions::default());
+    let first = shown(&mut tracker, &points, &turned, 80, rng);
+    let last = first.last().unwrap().unwrap();
+    assert_eq!((last.support, tracker.restarts()), (Support::RotationOnly, 0), "{last:?}");
+    assert!(last.pose.rotation_error(&turned) < 5e-3 && last.pose.t_21.norm() <= 0.0, "{last:?}");
+    // Carried aside, by little and by much: the rotation explains the images no more.
+    for share in [0.1, 0.2, 0.4, 1.0] {
+        let mut aside = tracker.clone();
+        let moved = pose([0.1, 0.25, -0.2], [0.3, -0.2, 0.1].map(|x| share * x));
+        let after = shown(&mut aside, &points, &moved, 80, rng);
+        assert!(aside.restarts() > 0, "{share}");
+        let last = after.last().unwrap().unwrap();
+        assert!(last.pose.rotation_error(&moved) < 2e-2, "{share}: {last:?}");
+        assert!(
+            last.support == Support::RotationOnly || last.pose.t_21.angle(&moved.t_21) < 0.3,
+            "{share}: {last:?}"
+        );
+    }
+    // Features that are anything: it looks for no place on a map that it does not have.
+    for _ in 0..30 {
+        let wrong: Vec<_> = (0..30).map(|_| Some([0; 2].map(|_| rng.random_range(-0.5..0.5)))).collect();
+        tracker.moved(&still());
+        assert!(tracker.estimate(&wrong).is_err());
+    }
+    assert!(tracker.restarts() > 0);
+}
+
+#[test]
+fn first_images_that_show_other_features_every_time_are_too_few() {
+    let points = points(12);
+    let image = seen(&points, &pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]));
+    let options = FilterOptions { first_images: 4, ..FilterOptions::default() };
+    let part = |k: usize| -> Vec<_> {
+        image.iter().enumerate().map(|(i, x)| x.filter(|_| (i < 6) == (k % 2 == 0))).collect()
+    };
+    let reasons = |estimator: &mut dyn FnMut(&[Option<[f64; 2]>]) -> Option<HoldReason>| -> Vec<_> {
+        (0..8).map(|k| estimator(&part(k)).unwrap()).collect()
+    };
+    let mut filter = DepthFilter::new(&goal(&points), SolverName::Quest, options);
+    let of_filter = reasons(&mut |image| filter.estimate(image).err());
+    let mut tracker = Tracker::new(&goal(&points), SolverName::Quest, options);
+    let of_tracker = reasons(&mut |image| tracker.estimate(image).err());
+    for reasons in [of_filter, of_tracker] {
+        for (k, reason) in reasons.iter().enumerate() {
+            let expected = if k % 4 == 3 { HoldReason::TooFewFeatures } else { HoldReason::Starting };
+            assert_eq!(*reason, expected, "image {k}: {reasons:?}");
+        }
+    }
+}
+
+#[test]
+fn a_pose_in_each_image_needs_depths_that_are_finite_and_an_image_with_all_features() {
+    let points = points(8);
+    let (goal, truth) = (goal(&points), pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]));
+    let image = seen(&points, &truth);
+    let mut depths: Vec<f64> = points.iter().map(|x| x.z).collect();
+    for choice in [Choice::ClosestDepths, Choice::Reprojection, Choice::RotationAxis] {
+        let mut estimator = PerFrame::new(&goal, SolverName::Quest, choice, Length::GoalDepths);
+        // The first image lacks a feature, so that its depths are no reference yet.
+        let mut some = image.clone();
+        some[4] = None;
+        for _ in 0..2 {
+            let found = estimator.estimate(&some).unwrap();
+            assert_eq!(found.inliers, 7);
+        }
+        assert_eq!(estimator.estimate(&image).unwrap().inliers, 8);
+        estimator.set_depths(&depths);
+        let found = estimator.estimate(&image).unwrap();
+        if choice != Choice::RotationAxis {
+            assert!(is_near(&found.pose, &truth, unit(&points)), "{choice:?}: {found:?}");
+        }
+    }
+    depths[1] = f64::INFINITY;
+    let mut estimator = PerFrame::new(&goal, SolverName::Quest, Choice::ClosestDepths, Length::GoalDepths);
+    estimator.set_depths(&depths);
+    assert_eq!(estimator.estimate(&image).unwrap_err(), HoldReason::Degenerate);
+}

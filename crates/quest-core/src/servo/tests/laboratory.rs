@@ -244,3 +244,26 @@ fn hostile_images_make_no_unsafe_command() {
         });
     }
 }
+
+#[test]
+fn a_camera_without_parallax_moves_a_little_and_then_knows_its_depths() {
+    for index in 0..3 {
+        let rng = &mut scenario::generator(0xe891, index);
+        let world = scenario::robot_world(Features::General, 30, noisy(None), rng);
+        let turn = Vector3::new(0.05, -0.05, 0.3);
+        let mut camera = FreeCamera::new(RelativePose::new(UnitQuaternion::new(turn), Vector3::zeros()));
+        let mut servo = loop_for(&world, rng);
+        servo.safety_mut().explore = 0.04;
+        let records = records(&world, &mut camera, servo, 300, rng);
+        let explored = records.iter().position(|r| r.step.state == State::Exploring);
+        let explored = explored.expect("no motion to see parallax");
+        assert!(records[..explored].iter().all(|r| r.truth.t_21.norm() < 0.02), "start {index}");
+        let tracked = records[explored..].iter().any(|r| r.step.state == State::Tracking);
+        assert!(tracked, "start {index}: no depths after the motion");
+        // Four hundredths of the depth, three times at most.
+        let furthest = records.iter().map(|r| r.truth.t_21.norm()).fold(0.0, f64::max);
+        assert!(furthest > 0.04 && furthest < 0.3, "start {index}: {furthest}");
+        let (metres, degrees) = off(&camera.pose());
+        assert!(metres < 0.02 && degrees < 1.0, "start {index}: {metres} m, {degrees}°");
+    }
+}

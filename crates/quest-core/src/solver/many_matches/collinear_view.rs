@@ -91,6 +91,11 @@ mod tests {
                 assert!(matches.iter().all(|m| m.bearing2().dot(&(e * m.bearing1())).abs() < 1e-14));
             }
         }
+        // The same match twice leaves a constraint less.
+        let twice = |[a, b, c, d, _]: [[f64; 3]; 5]| [a, b, c, d, a];
+        for matches in [matches(twice(line), twice(other)), matches(twice(other), twice(line))] {
+            assert_eq!(essential_matrices(&matches), None);
+        }
         assert_eq!(essential_matrices(&matches(line, line)), None);
         assert_eq!(essential_matrices(&matches(other, other)), None);
     }

@@ -181,4 +181,29 @@ mod tests {
         assert!(motions(&Matrix3::from_element(1.0)).iter().all(Option::is_none));
         assert!(motions(&Matrix3::zeros()).iter().all(Option::is_none));
     }
+
+    #[test]
+    fn the_plane_that_explains_all_matches_has_its_motions_and_any_other_none() {
+        let truth = Motion {
+            q_21: UnitQuaternion::new(Vector3::new(0.1, -0.2, 0.3)),
+            direction: Vector3::new(0.6, 0.0, 0.8),
+        };
+        let places = [[0.1, 0.2], [-0.3, 0.1], [0.2, -0.4], [-0.1, -0.2], [0.4, 0.3], [0.0, 0.35]];
+        let seen = |[u, v]: [f64; 2], off: f64| {
+            // On the plane z = 2 + x / 4.
+            let x1 = Vector3::new(u, v, 1.0) * (2.0 / (1.0 - 0.25 * u) + off);
+            let x2 = truth.q_21 * x1 + truth.direction * 0.5;
+            Correspondence::from_bearings(x1.into(), x2.into()).unwrap()
+        };
+        let flat = places.map(|place| seen(place, 0.0));
+        let found = motions_of_plane(&flat, 1e-9).map(Option::unwrap);
+        assert!(found.iter().any(|m| m.is_close(&truth, 1e-7) || m.twisted().is_close(&truth, 1e-7)));
+        // One point beside the plane.
+        let mut relief = flat;
+        relief[3] = seen(places[3], 0.5);
+        assert!(motions_of_plane(&relief, 1e-3).iter().all(Option::is_none));
+        // Points on a line, of which many planes are.
+        let line: Vec<_> = (0..6).map(|k| seen([0.1 * f64::from(k), 0.05 * f64::from(k)], 0.0)).collect();
+        assert!(motions_of_plane(&line, 1e-9).iter().all(Option::is_none));
+    }
 }

@@ -270,4 +270,12 @@ mod tests {
         // Solutions that are near each other lose digits, by a factor of more than 1e9 seldom.
         assert!(inaccurate * 1_000 < all, "{inaccurate} of {all}");
     }
+
+    #[test]
+    fn the_monomials_with_q1_and_without_it_are_all() {
+        let list = homogeneous::<35>(4);
+        let (with, without) = (select::<35, 20>(&list, true), select::<35, 15>(&list, false));
+        assert!(with.iter().all(|e| e[0] > 0) && without.iter().all(|e| e[0] == 0));
+        assert!(list.iter().all(|e| with.contains(e) != without.contains(e)));
+    }
 }

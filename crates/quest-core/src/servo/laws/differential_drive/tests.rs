@@ -188,3 +188,12 @@ fn a_robot_that_may_not_turn_away_backs_off_and_arrives() {
     let start = DifferentialDrive { x: 0.4, z: -0.4, heading: 0.0 };
     assert!(!is_home(&run(start, 0.0).0, 0.1));
 }
+
+#[test]
+fn exploring_goes_ahead_and_back_in_turn() {
+    let law = DifferentialDriveLaw::default();
+    for attempt in 0..4 {
+        let expected = if attempt % 2 == 0 { 1.0 } else { -1.0 };
+        assert_eq!(law.exploration(attempt), Twist::drive(expected, 0.0), "{attempt}");
+    }
+}
