@@ -417,3 +417,18 @@ fn a_point_without_derivatives_stays_where_it_is() {
     assert!(product.equations()[0].relative_residual(&real(&[0.0, 5.0])) <= 0.0);
     assert!(product.equations()[0].relative_residual(&real(&[1.0, 5.0])) > 0.9);
 }
+
+#[test]
+fn simple_solutions_next_to_each_other_are_two_and_a_common_cone_is_none() {
+    for gap in [1e-2, 1e-4, 5e-6] {
+        // (x − 1)(x − 1 − gap).
+        let found = solved(&system(&[&[(1.0, [2]), (-2.0 - gap, [1]), (1.0 + gap, [0])]]));
+        let counted: usize = found.all.iter().map(|s| s.multiplicity).sum();
+        assert_eq!((counted, found.at_infinity), (2, 0), "{gap}: {:?}", found.all);
+        assert!(has(&found, &[real(&[1.0]), real(&[1.0 + gap])], 0.1 * gap), "{gap}: {:?}", found.all);
+    }
+    let cone = [(1.0, [2, 0, 0]), (1.0, [0, 2, 0]), (-1.0, [0, 0, 2])];
+    let twice = cone.map(|(c, e)| (2.0 * c, e));
+    let error = solve(&system(&[&cone, &twice]), &Options::default()).unwrap_err();
+    assert!(matches!(error, SolveError::NotZeroDimensional { .. }), "{error}");
+}

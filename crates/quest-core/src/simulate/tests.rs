@@ -2,8 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_6, PI};
 
+use nalgebra::{UnitQuaternion, Vector3};
+
 use super::*;
-use crate::Correspondence;
+use crate::{Correspondence, RelativePose};
 
 /// One seed for this file; every test takes its own indices.
 const SEED: u64 = 0x5cee;
@@ -180,7 +182,7 @@ fn rounded_pixels_are_whole_numbers() {
 #[test]
 fn angles_and_axes_are_uniform() {
     let n = 4_000;
-    let (mut bins, mut axis) = ([0; 8], nalgebra::Vector3::zeros());
+    let (mut bins, mut axis) = ([0; 8], Vector3::zeros());
     for scene in scenes(&SceneOptions::default(), n) {
         // Uniform over [0, 2π] folds to uniform over [0, π].
         let angle = scene.truth.q_21.angle();
@@ -290,4 +292,20 @@ fn figures_vary_what_they_are_of_over_a_hundred_steps() {
         assert_eq!(scenes, if figure.varies_parallax() { 4_040 } else { 10_100 }, "{number}");
         assert_eq!(figure.varies_parallax(), number == 6);
     }
+}
+
+#[test]
+fn points_without_images_make_no_scene() {
+    let pose = RelativePose::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, 1.0));
+    let of =
+        |points: &[[f64; 3]]| Scene::from_points(pose, points.iter().map(|x| Vector3::from(*x)).collect());
+    assert_eq!(of(&[]).unwrap_err(), SceneError::NoPoints);
+    // On the plane z = 0 of either camera, or nowhere.
+    for bad in [[0.1, 0.2, 0.0], [0.1, 0.2, -1.0], [0.1, f64::NAN, 2.0]] {
+        let error = of(&[[0.0, 0.1, 2.0], bad]).unwrap_err();
+        assert!(matches!(error, SceneError::Image(_)), "{bad:?}: {error}");
+    }
+    let scene = of(&[[0.0, 0.1, 2.0], [0.3, 0.1, 3.0]]).unwrap();
+    let depths: f64 = scene.points1.iter().chain(&scene.points2().collect::<Vec<_>>()).map(|x| x.z).sum();
+    assert!((depths / 4.0 - 1.0).abs() < 1e-14, "{depths}");
 }

@@ -364,7 +364,7 @@ mod tests {
             [[1.0, 1.0, 4.0], [-1.0, 1.0, 4.0], [-1.0, -1.0, 4.0], [1.0, -1.0, 4.0], [0.0, 0.0, 3.0]];
         let quarter = std::f64::consts::FRAC_PI_2;
         for turn in [[0.0; 3], [0.0, 0.2, 0.0], [0.0, 0.0, quarter], [0.1, 0.1, 0.0]] {
-            for t_21 in [[0.5, 0.0, 0.0], [0.0, 0.4, 0.0], [0.3, 0.3, 0.0], [0.3, -0.2, 0.4]] {
+            for t_21 in [[0.5, 0.0, 0.0], [0.0, 0.4, 0.0], [0.3, -0.2, 0.4]] {
                 let truth = crate::RelativePose::new(UnitQuaternion::new(turn.into()), t_21.into());
                 let matches = points.map(|x1| {
                     let x2 = truth.q_21 * Vector3::from(x1) + truth.t_21;

@@ -73,7 +73,7 @@ pub fn joint_velocities(
             factor = factor.min(most / speed.abs());
         }
     }
-    if !(factor.is_finite() && out.iter().all(|s| s.is_finite())) {
+    if !out.iter().all(|s| s.is_finite()) {
         out.fill(0.0);
         return 0.0;
     }

@@ -146,7 +146,7 @@ impl Border {
         }
         let all = free + bounds.len();
         let kept = (all / 4).max(Self::FEWEST).min(all);
-        if free >= kept || bounds.is_empty() {
+        if free >= kept {
             return wanted;
         }
         // The features that ask for the smallest change come first.

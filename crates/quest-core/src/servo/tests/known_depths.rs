@@ -329,3 +329,37 @@ fn a_pose_in_each_image_needs_depths_that_are_finite_and_an_image_with_all_featu
     estimator.set_depths(&depths);
     assert_eq!(estimator.estimate(&image).unwrap_err(), HoldReason::Degenerate);
 }
+
+/// A pixel without a viewing ray is no number on the plane z = 1.
+#[test]
+fn a_goal_feature_that_is_not_a_number_takes_no_part() {
+    let truth = pose([0.05, -0.1, 0.2], [0.15, -0.1, 0.25]);
+    for count in [9, 20, 40] {
+        let points = points(count);
+        let (mut goal, image) = (goal(&points), seen(&points, &truth));
+        goal[3] = [f64::NAN; 2];
+        goal[5] = [0.1, f64::INFINITY];
+        let rng = &mut scenario::generator(27, 0);
+        let mut tracker = Tracker::new(&goal, SolverName::Quest, FilterOptions::default());
+        let mut filter = DepthFilter::new(&goal, SolverName::Quest, FilterOptions::default());
+        let mut found = [Err(HoldReason::Starting); 2];
+        for _ in 0..60 {
+            let mut image = image.clone();
+            for x in image.iter_mut().flatten().flatten() {
+                *x += rng.random_range(-3e-4..3e-4);
+            }
+            tracker.moved(&still());
+            found = [tracker.estimate(&image), filter.estimate(&image)];
+        }
+        for (name, found) in ["tracker", "filter"].into_iter().zip(found) {
+            let found = found.unwrap_or_else(|reason| panic!("{count}, {name}: {reason}"));
+            assert!(found.pose.rotation_error(&truth) < 2e-2, "{count}, {name}: {found:?}");
+            assert!(found.pose.t_21.angle(&truth.t_21) < 0.1, "{count}, {name}: {found:?}");
+        }
+        // Nor does a depth that is given for it.
+        let mut known = Tracker::new(&goal, SolverName::Quest, FilterOptions::default());
+        known.set_depths(&points.iter().map(|x| x.z).collect::<Vec<_>>(), 0.01);
+        assert!(is_near(&settled(&mut known, &image), &truth, unit(&points)), "{count}");
+        assert!(known.depths().nth(3).unwrap().is_nan() && !known.inliers()[3], "{count}");
+    }
+}

@@ -112,7 +112,7 @@ impl<S: PoseSource> DepthFilter<S> {
 
 impl<S: PoseSource> PoseEstimator for DepthFilter<S> {
     fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason> {
-        self.image.take(features);
+        self.image.take(features, &self.setting.goal);
         let result = self.estimated();
         if result.is_ok() {
             (self.missed, self.has_started) = (0, true);

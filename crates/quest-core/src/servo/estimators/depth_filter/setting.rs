@@ -46,11 +46,12 @@ impl Image {
         Self { frame: vec![None; features], sigma: 0.0 }
     }
 
-    /// Takes over an image, without features at impossible places.
-    pub(super) fn take(&mut self, features: &[Option<[f64; 2]>]) {
+    /// Takes over an image, without features at impossible places and without those that have no place in the goal.
+    pub(super) fn take(&mut self, features: &[Option<[f64; 2]>], goal: &[[f64; 2]]) {
         self.frame.iter_mut().for_each(|f| *f = None);
-        for (kept, seen) in self.frame.iter_mut().zip(features) {
-            *kept = seen.filter(|m| m.iter().all(|c| c.is_finite() && c.abs() < 1e3));
+        for ((kept, seen), goal) in self.frame.iter_mut().zip(features).zip(goal) {
+            let is_placed = goal.iter().all(|c| c.is_finite());
+            *kept = seen.filter(|m| is_placed && m.iter().all(|c| c.is_finite() && c.abs() < 1e3));
         }
     }
 

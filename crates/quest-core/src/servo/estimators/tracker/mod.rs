@@ -190,11 +190,13 @@ impl<S: PoseSource> Tracker<S> {
         if !(mean > 0.0 && mean.is_finite()) {
             return;
         }
-        for (known, (z, precision)) in self.known.iter_mut().zip(depths.iter().zip(precisions)) {
+        let places = self.goal.iter().map(|goal| goal.iter().all(|c| c.is_finite()));
+        let given = depths.iter().zip(precisions).zip(places);
+        for (known, ((z, precision), is_placed)) in self.known.iter_mut().zip(given) {
             let rho = inverse(*z) / mean;
             // An infinitely far feature is as certain as the mean one.
             let variance = (precision * rho.max(0.1)).powi(2);
-            *known = (!z.is_nan() && variance > 0.0).then_some(Known { rho, variance });
+            *known = (is_placed && !z.is_nan() && variance > 0.0).then_some(Known { rho, variance });
         }
         self.reset();
     }
@@ -392,8 +394,10 @@ impl<S: PoseSource> Tracker<S> {
 impl<S: PoseSource> PoseEstimator for Tracker<S> {
     fn estimate(&mut self, features: &[Option<[f64; 2]>]) -> Result<Estimate, HoldReason> {
         self.frame.iter_mut().for_each(|f| *f = None);
-        for (kept, seen) in self.frame.iter_mut().zip(features) {
-            *kept = seen.filter(|m| m.iter().all(|c| c.is_finite() && c.abs() < 1e3));
+        for ((kept, seen), goal) in self.frame.iter_mut().zip(features).zip(&self.goal) {
+            // A feature without a place in the goal has none to be held against.
+            let is_placed = goal.iter().all(|c| c.is_finite());
+            *kept = seen.filter(|m| is_placed && m.iter().all(|c| c.is_finite() && c.abs() < 1e3));
         }
         self.inliers.fill(false);
         if self.seen() < self.options.min_features {

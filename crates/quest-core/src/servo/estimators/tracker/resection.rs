@@ -312,3 +312,101 @@ pub(crate) fn moved(pose: &RelativePose, step: &Vector6<f64>) -> RelativePose {
     let q_21 = UnitQuaternion::new_normalize((turn * pose.q_21).into_inner());
     RelativePose::new(q_21, pose.t_21 + Vector3::new(step[3], step[4], step[5]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TASK: Task = Task {
+        variance: 1e-6,
+        place_variance: 1e-6,
+        ground: None,
+        is_translation_fixed: false,
+        mapped_only: false,
+        depth_variance: None,
+        iterations: 8,
+    };
+
+    fn points() -> Vec<Point> {
+        let point = |k: f64| Point {
+            place: [0.5 * (1.7 * k).sin(), 0.5 * (2.9 * k + 1.0).cos()],
+            rho: 1.0 + 0.3 * (2.3 * k).sin(),
+            variance: 1e-6,
+            is_mapped: true,
+        };
+        (0..12).map(|k| point(f64::from(k))).collect()
+    }
+
+    fn seen(points: &[Point], pose: &RelativePose) -> Vec<Option<[f64; 2]>> {
+        let of = |point: &Point| {
+            let x2 = pose.q_21 * Vector3::new(point.place[0], point.place[1], 1.0) + pose.t_21 * point.rho;
+            Some([x2.x / x2.z, x2.y / x2.z])
+        };
+        points.iter().map(of).collect()
+    }
+
+    fn fitted(
+        points: &[Point],
+        frame: &[Option<[f64; 2]>],
+        start: &RelativePose,
+        task: &Task,
+    ) -> Option<Fit> {
+        let mut squares = vec![f64::NAN; points.len()];
+        residuals(points, frame, start, task, &mut squares);
+        resect(points, frame, start, task, &mut squares, &mut Vec::new())
+    }
+
+    #[test]
+    fn a_planted_pose_is_found_and_lost_points_take_no_part() {
+        let points = points();
+        let truth = RelativePose::new(
+            UnitQuaternion::new(Vector3::new(0.05, -0.1, 0.2)),
+            Vector3::new(0.1, -0.05, 0.2),
+        );
+        let start = RelativePose::identity();
+        let mut frame = seen(&points, &truth);
+        let fit = fitted(&points, &frame, &start, &TASK).unwrap();
+        assert!(fit.pose.rotation_error(&truth) < 1e-6 && (fit.pose.t_21 - truth.t_21).norm() < 1e-6);
+        assert_eq!((fit.seen, fit.inliers), (12, 12));
+        let covariance = fit.covariance().unwrap();
+        assert!((0..6).all(|k| covariance[(k, k)] > 0.0 && covariance[(k, k)] < 1e-3), "{covariance}");
+        (frame[2], frame[5]) = (None, Some([3.0, -2.0]));
+        let fit = fitted(&points, &frame, &start, &TASK).unwrap();
+        assert!(fit.pose.rotation_error(&truth) < 1e-2 && (fit.pose.t_21 - truth.t_21).norm() < 1e-2);
+        assert_eq!((fit.seen, fit.inliers), (11, 10));
+    }
+
+    #[test]
+    fn an_image_that_shows_nothing_leaves_the_pose_and_determines_none() {
+        let points = points();
+        let pose = RelativePose::new(UnitQuaternion::new(Vector3::x() * 0.2), Vector3::y() * 0.1);
+        let fit = fitted(&points, &[None; 12], &pose, &TASK).unwrap();
+        assert_eq!((fit.seen, fit.inliers), (0, 0));
+        assert!(fit.cost <= 0.0 && fit.square <= 0.0);
+        assert!(fit.pose.rotation_error(&pose) < 1e-12 && (fit.pose.t_21 - pose.t_21).norm() < 1e-12);
+        // What is left of the information is far below that of an image.
+        assert!((0..6).all(|k| fit.information[(k, k)] < 1e-3));
+    }
+
+    #[test]
+    fn points_that_are_behind_or_nowhere_agree_with_nothing() {
+        let mut points = points();
+        let frame = seen(&points, &RelativePose::identity());
+        let mut squares = vec![0.0; 12];
+        let behind = RelativePose::new(UnitQuaternion::identity(), Vector3::z() * -3.0);
+        let cost = residuals(&points, &frame, &behind, &TASK, &mut squares);
+        assert!(
+            squares.iter().all(|square| square.to_bits() == BEHIND.to_bits()) && cost > 11.9 * 2.0 * KNEE
+        );
+        let nowhere = RelativePose::new(UnitQuaternion::identity(), Vector3::repeat(f64::NAN));
+        assert!(residuals(&points, &frame, &nowhere, &TASK, &mut squares).is_finite());
+        assert!(squares.iter().all(|square| square.to_bits() == BEHIND.to_bits()));
+        // A place that is no number is that of one feature alone.
+        points[4].place[1] = f64::NAN;
+        residuals(&points, &frame, &RelativePose::identity(), &TASK, &mut squares);
+        assert!(squares.iter().enumerate().all(|(k, square)| (*square > INLIER) == (k == 4)), "{squares:?}");
+        let fit = fitted(&points, &frame, &RelativePose::identity(), &TASK).unwrap();
+        assert_eq!((fit.seen, fit.inliers), (12, 11));
+        assert!(fit.pose.q_21.angle() < 1e-9 && fit.pose.t_21.norm() < 1e-9);
+    }
+}

@@ -311,3 +311,86 @@ fn plane_through(points: &[Point], first: Vector3<f64>, goal: &[[f64; 2]], chose
     }
     if plane.iter().all(|x| x.is_finite()) { plane } else { first }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::servo::estimators::tracker::map::Map;
+
+    const GOAL: [[f64; 2]; 9] = [
+        [0.0, 0.0],
+        [0.3, 0.1],
+        [-0.2, 0.3],
+        [0.1, -0.4],
+        [-0.3, -0.1],
+        [0.4, 0.4],
+        [-0.4, 0.2],
+        [0.2, -0.2],
+        [-0.1, 0.4],
+    ];
+
+    /// An answer that is told apart from others by its way.
+    fn answer(x: f64, score: f64, relief: f64) -> Hypothesis {
+        let mut h = Hypothesis::new(Map::new(&GOAL, 4, relief));
+        h.pose = RelativePose::new(UnitQuaternion::identity(), Vector3::x() * x);
+        h.score = score;
+        h
+    }
+
+    /// The ways and scores of the pool after these answers.
+    fn ranked(answers: impl IntoIterator<Item = Hypothesis>) -> Vec<(f64, f64)> {
+        let mut pool = vec![answer(0.0, 0.0, 0.3); POOL + 1];
+        let mut count = 0;
+        for new in answers {
+            pool[count] = new;
+            rank(&mut pool, &mut count);
+        }
+        pool[..count].iter().map(|h| (h.pose.t_21.x, h.score)).collect()
+    }
+
+    #[test]
+    fn the_best_answers_come_first_each_of_them_once() {
+        let of = |x, score| answer(x, score, 0.3);
+        assert_eq!(ranked([of(1.0, 5.0), of(2.0, 3.0), of(3.0, 4.0)]), [(2.0, 3.0), (3.0, 4.0), (1.0, 5.0)]);
+        // The same answer again counts where it is better.
+        assert_eq!(ranked([of(1.0, 5.0), of(2.0, 3.0), of(1.001, 6.0)]), [(2.0, 3.0), (1.0, 5.0)]);
+        assert_eq!(ranked([of(1.0, 5.0), of(2.0, 3.0), of(1.001, 2.0)]), [(1.001, 2.0), (2.0, 3.0)]);
+        // As a plane it is another one.
+        assert_eq!(ranked([of(1.0, 5.0), answer(1.0, 6.0, PLANE_RELIEF)]), [(1.0, 5.0), (1.0, 6.0)]);
+        // What is not finite is no answer.
+        for bad in [of(1.0, f64::NAN), of(1.0, f64::INFINITY), of(f64::NAN, 1.0), of(f64::INFINITY, 1.0)] {
+            assert_eq!(ranked([bad.clone()]), []);
+            assert_eq!(ranked([of(2.0, 3.0), bad, of(3.0, 2.0)]), [(3.0, 2.0), (2.0, 3.0)]);
+        }
+        // A full pool keeps the best.
+        let many = |order: fn(usize) -> usize| {
+            ranked((0..20).map(order).map(|k| of(k as f64, k as f64))).into_iter().map(|(_, score)| score)
+        };
+        assert!(many(|k| k).eq((0..POOL).map(|k| k as f64)));
+        assert!(many(|k| 19 - k).eq((0..POOL).map(|k| k as f64)));
+    }
+
+    #[test]
+    fn the_plane_of_most_of_the_points_is_found() {
+        let plane = Vector3::new(0.2, -0.1, 0.9);
+        let mut points: Vec<Point> = GOAL
+            .iter()
+            .map(|place| {
+                let rho = plane.dot(&Vector3::new(place[0], place[1], 1.0));
+                Point { place: *place, rho, variance: 0.0, is_mapped: true }
+            })
+            .collect();
+        let first = Vector3::new(0.19, -0.09, 0.91);
+        let found = plane_through(&points, first, &GOAL, &[true; 9]);
+        assert!((found - plane).norm() < 1e-6, "{found}");
+        // Two points are off it; one that is anything was not chosen.
+        (points[2].rho, points[6].rho, points[8].rho) = (2.0, 0.1, f64::NAN);
+        let chosen: [bool; 9] = std::array::from_fn(|i| i != 8);
+        let found = plane_through(&points, first, &GOAL, &chosen);
+        assert!((found - plane).norm() < 1e-2, "{found}");
+        // Depths that are no numbers leave the plane that was known.
+        assert_eq!(plane_through(&points, first, &GOAL, &[true; 9]), first);
+    }
+}
