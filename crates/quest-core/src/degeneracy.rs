@@ -132,7 +132,9 @@ mod tests {
         // One place in either view.
         for view in [0, 1] {
             let mut points = general;
-            points.iter_mut().for_each(|point| point[view] = [0.1, -0.2]);
+            for point in &mut points {
+                point[view] = [0.1, -0.2];
+            }
             assert_eq!(reason(&points), Degeneracy::Coincident);
         }
         // Four matches and one of them again and again: fewer than five differ.

@@ -206,10 +206,14 @@ mod tests {
             // The first column, then the second one after a good first one.
             for column in [0, 1] {
                 let mut a = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
-                a.iter_mut().for_each(|row| row[column] = bad);
+                for row in &mut a {
+                    row[column] = bad;
+                }
                 assert!(reduce(&mut a, 0) <= 0.0, "{bad} {column}");
                 let mut a = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 10.0]];
-                a.iter_mut().for_each(|row| row[column] = bad);
+                for row in &mut a {
+                    row[column] = bad;
+                }
                 assert!(null_vector(&mut a).is_none(), "{bad} {column}");
             }
         }
