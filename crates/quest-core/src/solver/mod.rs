@@ -400,4 +400,12 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_solver_is_found_by_its_name() {
+        for solver in SolverName::named() {
+            assert_eq!(solver.info().name.parse(), Ok(solver));
+        }
+        assert_eq!("none".parse::<SolverName>(), Err(UnknownSolver { found: "none".to_owned() }));
+    }
 }

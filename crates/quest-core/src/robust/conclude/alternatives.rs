@@ -161,3 +161,59 @@ pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
 pub(crate) fn distance(a: &Motion, b: &Motion) -> f64 {
     a.q_21.angle_to(&b.q_21) + a.direction.angle(&b.direction)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::SearchScore;
+    use crate::robust::conclude::plane;
+    use crate::robust::data::observations::Observations;
+    use crate::robust::search::sampling;
+    use crate::simulate::{FOCAL_LENGTH, Layout, Scene, SceneOptions};
+
+    #[test]
+    fn a_pose_is_replaced_by_one_that_is_clearly_better() {
+        let options = SceneOptions { points: 100, noise_px: 0.5, ..SceneOptions::realistic() };
+        let scene = Scene::generate(&options, 0xa17, 0).unwrap();
+        let order = (0..).take(scene.matches.len()).collect();
+        let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
+        let mut poses = PoseScorer::new(&observations, SearchScore::default());
+        let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
+        let polished = polish(&mut poses, truth);
+        // Behind its cameras the points of the opposite motion refine nothing, so that it is known again.
+        let opposite = Motion { direction: -truth.direction, ..truth };
+        let mut taken = |lower: f64| {
+            let of_plane = Scored { motion: opposite, cost: polished.pose.scored.cost - lower };
+            let other = Alternative { of_plane, refined: of_plane };
+            let found = better_of(&mut poses, polished.clone(), &[other]);
+            is_same(found.motion(), &opposite)
+        };
+        assert!(!taken(-0.5 * CLEARLY) && !taken(0.5 * CLEARLY) && taken(2.0 * CLEARLY));
+    }
+
+    #[test]
+    fn of_a_plane_the_other_motion_is_as_likely() {
+        let options = SceneOptions {
+            points: 100,
+            noise_px: 0.5,
+            layout: Layout::Coplanar,
+            ..SceneOptions::realistic()
+        };
+        let mut count = 0;
+        for index in 0..20 {
+            let scene = Scene::generate(&options, 0xa17, 100 + index).unwrap();
+            let order = (0..).take(scene.matches.len()).collect();
+            let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], 1.5);
+            let mut poses = PoseScorer::new(&observations, SearchScore::default());
+            let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
+            let polished = polish(&mut poses, truth);
+            let plane = plane::fit(&observations, &polished, &mut sampling::generator(0xa17, index));
+            let others = alternatives(&mut poses, &plane.unwrap(), &polished);
+            if let Some(second) = as_likely(&mut poses, &others, &polished) {
+                assert!(second.direction.angle(&polished.motion().direction) > ELSEWHERE, "{index}");
+                count += 1;
+            }
+        }
+        assert!(count >= 5, "{count}");
+    }
+}

@@ -188,6 +188,7 @@ mod tests {
     use crate::lanes::SearchScore as Score;
     use crate::robust::conclude::by_chance::ByChance;
     use crate::robust::conclude::false_alarms;
+    use crate::robust::conclude::length::{Noise, length};
     use crate::robust::refine::loss::HeavyTailed;
     use crate::robust::search::pose_score::PoseScorer;
     use crate::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
@@ -254,5 +255,43 @@ mod tests {
         let [with, _] = determinants(&matches, motion);
         // It is no inlier, but one more match may be false.
         assert!((with / without - 1.0).abs() < 0.5, "{with} {without}");
+    }
+
+    #[test]
+    fn the_covariance_of_a_rotation_is_that_of_its_noise() {
+        let count = 400;
+        let places = (0..count).map(|k| {
+            let k = f64::from(k);
+            [0.05 * (2.1 * k).sin(), 0.05 * (3.7 * k).cos()]
+        });
+        let places: Vec<[f64; 2]> = places.collect();
+        let matches = crate::correspondence::from_image_points(&places, &places).unwrap();
+        let all: Vec<u32> = (0..).take(matches.len()).collect();
+        let observations = Observations::new(&matches, all.clone(), [[500.0; 2]; 2], 1.5);
+        let still = Motion { q_21: UnitQuaternion::identity(), direction: Vector3::x() };
+        let false_matches = false_alarms::false_matches(&observations);
+        let noise = Noise { sigma: 1.0, false_matches: &false_matches, by_chance: &ByChance::unknown() };
+        let mut size = length(&observations, &still, &[], &noise);
+        (size.value, size.variance) = (0.3, 0.01);
+        for sigma in [0.5, 3.0] {
+            let found = of_rotation(&observations, &still.q_21, &all, sigma, size).unwrap();
+            // A turn about x or y moves all points alike by the focal length; both views have the noise.
+            let expected = 2.0 * (sigma / 500.0).powi(2) / f64::from(count);
+            for k in 0..2 {
+                assert!((found[(k, k)] / expected - 1.0).abs() < 0.02, "{} {expected}", found[(k, k)]);
+                assert!((found[(3 + k, 3 + k)] - 0.1).abs() < 1e-15);
+            }
+            assert!(found.fixed_view::<3, 3>(0, 3).amax() <= 0.0);
+        }
+    }
+
+    #[test]
+    fn of_an_open_pose_any_rotation_is_possible() {
+        let pose = RelativePose::new(UnitQuaternion::identity(), Vector3::new(0.3, 0.0, -0.4));
+        let found = of_nothing(&pose);
+        // A turn about an axis is at most π: what is just not said is that of rotations of half a turn.
+        let turn = found.fixed_view::<3, 3>(0, 0).trace();
+        assert!((0.99 * PI * PI..PI * PI).contains(&turn) && says_something(&found), "{turn}");
+        assert!((found[(4, 4)] - 0.25).abs() < 1e-15);
     }
 }

@@ -94,3 +94,28 @@ pub(crate) fn best_of(poses: &mut PoseScorer, motion: &Motion) -> Option<Scored>
     poses.recycle(pose);
     Some(scored)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::SearchScore;
+    use crate::robust::data::observations::Observations;
+    use crate::simulate::{FOCAL_LENGTH, Scene, SceneOptions};
+
+    #[test]
+    fn the_last_refinement_looks_as_far_as_the_noise_says() {
+        for (noise_px, threshold) in [(0.2, 1.0), (0.5, 1.5), (3.0, 10.0)] {
+            let options = SceneOptions { points: 300, noise_px, ..SceneOptions::realistic() };
+            let mut scene = Scene::generate(&options, 0xf1_a1, 0).unwrap();
+            scene.add_outliers(0.2, 0xf1_a1, 0).unwrap();
+            let order = (0..).take(scene.matches.len()).collect();
+            let observations = Observations::new(&scene.matches, order, [[FOCAL_LENGTH; 2]; 2], threshold);
+            let mut poses = PoseScorer::new(&observations, SearchScore::default());
+            let truth = Motion { q_21: scene.truth.q_21, direction: scene.truth.t_21.normalize() };
+            let found = polish(&mut poses, truth);
+            // The variance of 240 residuals, and what is added to it where a loss is scaled.
+            assert!((found.sigma / noise_px - 1.0).abs() < 0.2, "{} {noise_px}", found.sigma);
+            assert!((found.limit / (WIDE * noise_px) - 1.0).abs() < 0.3, "{} {noise_px}", found.limit);
+        }
+    }
+}

@@ -191,4 +191,38 @@ mod tests {
             }
         }
     }
+
+    /// A depth of this value, known so well that its noise says nothing.
+    fn known(value: f64, precision: f64) -> InverseDepth {
+        InverseDepth { x1: Vector3::z(), x2: Vector3::z(), value, precision }
+    }
+
+    #[test]
+    fn what_is_known_of_inverse_depths_is_a_density() {
+        let usual = Usual { median: 0.7, reach: 0.02 };
+        // Beyond 400 γ is `3√3/(4π) u⁻²` of it.
+        let (step, ends) = (0.01, 400.0);
+        let places = (-40_000..=40_000).map(|k| step * f64::from(k));
+        let (mut all, mut beyond) = (0.0, 0.0);
+        for u in places {
+            let density = usual.density(&known(0.7 + 0.02 * u, 1e12), 1.0) * 0.02 * step;
+            all += density;
+            beyond += if u.abs() > 3.0 { density } else { 0.0 };
+        }
+        let rest = 0.413_5 / (ends * ends);
+        assert!((all + rest - 1.0).abs() < 1e-4, "{all}");
+        // The share that chance inliers are counted against.
+        assert!((beyond + rest - 0.0452).abs() < 5e-4, "{beyond}");
+        // Of a depth that is not known so well the noise is the scale.
+        assert!((usual.distance(&known(0.9, 100.0), 1.0) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_spread_of_inverse_depths_is_without_that_of_their_noise() {
+        let spread = |reach: f64, noise: f64| Usual { median: 0.0, reach }.spread(noise, 50);
+        assert!((spread(0.3 * DEVIATIONS, 0.04) - 0.05).abs() < 1e-12);
+        // Noise alone may hide two deviations of its own scatter: √(2/50) of it.
+        assert!((spread(0.2 * DEVIATIONS, 0.04) - 2.0 * 0.04 * 0.2).abs() < 1e-12);
+        assert!((spread(0.0, 9.0) - 2.0 * 9.0 * 0.2).abs() < 1e-12);
+    }
 }

@@ -152,6 +152,7 @@ fn merged(q_21: &UnitQuaternion<f64>, all: &[Component]) -> Distribution {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robust::conclude::depth_field::DepthField;
 
     /// A covariance of no pattern.
     fn covariance() -> Matrix6<f64> {
@@ -203,5 +204,24 @@ mod tests {
     fn a_covariance_in_another_unit_is_that_of_scaled_translations() {
         let units = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 3.0, 3.0, 3.0));
         assert!((in_unit(&covariance(), 3.0) - units * covariance() * units).amax() < 1e-15);
+    }
+
+    /// Noise across a translation of length one makes it longer by half of its variance, which is taken back.
+    #[test]
+    fn a_mode_is_as_long_as_it_is_without_its_noise() {
+        let known = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, 0.5, 0.02, 0.03));
+        let mode = Mode {
+            at: DepthField::start(start(), Vector3::x(), 0.2),
+            nats: 3.0,
+            covariance: known,
+            mean_depth: 2.0,
+            covariance_by_depth: Matrix6::identity(),
+        };
+        let after =
+            |_: &UnitQuaternion<f64>, t_21: Vector3<f64>| Vector6::new(0.0, 0.0, 0.0, t_21.x, t_21.y, t_21.z);
+        let found = of_mode(&mode, &after);
+        // Along the translation the noise has the mean zero. The unit is the mean depth.
+        assert!((found.mean - Vector6::new(0.0, 0.0, 0.0, 0.4875, 0.0, 0.0)).amax() < 1e-15);
+        assert!((found.covariance[(3, 3)] - (1.0 + CURVED * 0.05)).abs() < 1e-12);
     }
 }

@@ -288,3 +288,49 @@ impl<L: RobustLoss> Descent for Refinement<'_, L> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+    use crate::robust::data::image::Image;
+    use crate::robust::refine::loss::HeavyTailed;
+
+    #[test]
+    fn the_gradient_is_half_of_the_derivative_of_the_cost() {
+        let motion = Motion {
+            q_21: UnitQuaternion::new(Vector3::new(0.2, -0.1, 0.3)),
+            direction: Vector3::new(0.5, 0.3, 0.8).normalize(),
+        };
+        // Eleven matches, some pixels off, leave a block that is not full.
+        let points = |of: fn(Vector3<f64>) -> Vector3<f64>| {
+            (0..11).map(move |k| {
+                let k = f64::from(k);
+                let x1 = Vector3::new(0.5 * (2.1 * k).sin(), 0.4 * (3.7 * k).cos(), 1.0);
+                let x2 = motion.q_21 * x1 * (3.0 + (1.3 * k).sin()) + motion.direction;
+                let off = Vector3::new(0.02 * (5.0 * k).sin(), 0.03 * k.cos(), 0.0);
+                [of(x1), of(x2 / x2.z + off)]
+            })
+        };
+        let plane = Columns::of_points([Image::Plane([500.0, 400.0]); 2], 1.0, points(|x| x));
+        let sphere = Columns::of_points([Image::Sphere(500.0); 2], 1.0, points(|x| x.normalize()));
+        let all: Vec<u32> = (0..11).collect();
+        for columns in [plane, sphere] {
+            let subset = Subset::new(&columns, &all);
+            let loss = HeavyTailed::new(5.0);
+            let gradient = subset.equations(&motion, &loss).gradient;
+            for k in 0..5 {
+                let cost = |by: f64| {
+                    let mut step = [0.0; 5];
+                    step[k] = by;
+                    subset.equations(&motion.stepped(&tangent_basis(&motion.direction), &step), &loss).cost
+                };
+                // Rounding of a thousand over the step.
+                let derivative = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+                let error = derivative - 2.0 * gradient[k];
+                assert!(error.abs() < 1e-5 * gradient.norm(), "{k}: {derivative} {}", gradient[k]);
+            }
+        }
+    }
+}

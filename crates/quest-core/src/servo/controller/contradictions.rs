@@ -55,3 +55,22 @@ impl Contradictions {
         0.5_f64.powi(i32::from(self.in_a_row.min(Self::MOST)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_at_full_speed_clear_a_contradiction() {
+        for (state, trust) in [(State::Tracking, 1.0), (State::Confirming, 0.5)] {
+            let mut contradictions = Contradictions::default();
+            contradictions.count(1, State::Confirming, Some(1.0));
+            for _ in 1..Contradictions::ENOUGH {
+                contradictions.count(1, state, Some(1.0));
+                assert!((contradictions.trust() - 0.5).abs() <= 0.0);
+            }
+            contradictions.count(1, state, Some(1.0));
+            assert!((contradictions.trust() - trust).abs() <= 0.0, "{state:?}");
+        }
+    }
+}

@@ -190,3 +190,22 @@ fn eliminate<L: Lanes<f64>, const K: usize>(lanes: L, m: &mut [[F<L>; 6]; 5]) ->
     }
     -inverse * m[K][K]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algebra::vectors::two::{Two, TwoLanes};
+
+    #[test]
+    fn the_tangents_complete_a_right_handed_frame() {
+        // One direction in each lane, on either side of the plane where the signs change.
+        let t = [Two::new([0.6, -0.48]), Two::new([-0.48, 0.6]), Two::new([0.64, -0.64])];
+        let [e1, e2] = tangent_basis(TwoLanes, &t);
+        let frame = [t, e1, e2].map(|v| v.map(Two::to_array));
+        for lane in 0..2 {
+            let [t, e1, e2] = frame.map(|v| nalgebra::Vector3::from(v.map(|x| x[lane])));
+            assert!((t.cross(&e1) - e2).amax() < 1e-15, "{e1} {e2}");
+            assert!((e1.norm() - 1.0).abs() < 1e-15 && e1.dot(&t).abs() < 1e-15, "{e1}");
+        }
+    }
+}

@@ -117,3 +117,52 @@ pub(crate) fn precisions() -> Field {
     };
     Field::from_iterator(degrees().map(of_degree))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polynomials_are_those_of_hermite_up_to_the_fourth_degree() {
+        let all: Vec<[usize; 2]> = degrees().collect();
+        let mut distinct = all.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!((all.len(), distinct.len()), (TERMS, TERMS));
+        assert!(all.iter().all(|[i, j]| (1..=DEGREE).contains(&(i + j))));
+        // He(n+1) = x He(n) − n He(n−1), over √n!.
+        let hermite = |x: f64| {
+            let mut all = [1.0, x, 0.0, 0.0, 0.0];
+            for n in 1..DEGREE {
+                all[n + 1] = x * all[n] - n as f64 * all[n - 1];
+            }
+            let norm = |n: usize| (1..=n).map(|k| k as f64).product::<f64>().sqrt();
+            [0, 1, 2, 3, 4].map(|n: usize| all[n] / norm(n))
+        };
+        for at in [[0.7, -1.3], [-1.6, 0.4]] {
+            let [first, second] = at.map(hermite);
+            for ([i, j], found) in degrees().zip(polynomials(at)) {
+                assert!((found - first[i] * second[j]).abs() < 1e-14, "{i} {j}: {found}");
+            }
+        }
+        // Beyond the edge they are constant.
+        assert!(polynomials([9.0, -0.3]).eq(polynomials([EDGE, -0.3])));
+    }
+
+    #[test]
+    fn a_coefficient_at_its_deviation_costs_half_a_nat() {
+        let precisions = precisions();
+        for (k, [i, j]) in degrees().enumerate() {
+            let mut at = DepthField::start(UnitQuaternion::identity(), Vector3::zeros(), 0.1);
+            let degree = (i + j) as f64;
+            let deviation = RELIEF * 0.5_f64.powf(0.5 * (degree - 1.0));
+            for times in [1.0, -2.0] {
+                at.field[k] = times * deviation;
+                assert!((at.surprise(&precisions) - 0.5 * times * times).abs() < 1e-12, "{i} {j}");
+                // What is linear in the image is a plane.
+                let off = if i + j == 1 { 0.1 } else { (times * deviation).hypot(0.1) };
+                assert!((at.off_plane() - off).abs() < 1e-12, "{i} {j}");
+            }
+        }
+    }
+}

@@ -171,3 +171,120 @@ fn regularised(sums: &Sums, precisions: &Field) -> Option<Factor> {
     }
     equations.cholesky()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix6, Vector3};
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::robust::conclude::depth_field::field::terms;
+    use crate::robust::conclude::depth_field::planted::{likelihood, of_field, turn};
+    use crate::robust::search::sampling;
+
+    const SEED: u64 = 0xf1e1d;
+    const SIGMA: f64 = 0.5;
+
+    /// Half a corridor: its right side is twice as near.
+    fn corridor() -> Field {
+        let mut field = Field::zeros();
+        // The degrees (1, 0) and (2, 0) come after the four of the second variable alone.
+        field[4] = 0.25;
+        field[8] = 0.1;
+        field
+    }
+
+    #[test]
+    fn a_fit_finds_the_pose_and_the_field() {
+        let t_21 = Vector3::new(0.02, -0.01, 0.015);
+        let mut all = 0.0;
+        for index in 0..10 {
+            let rng = &mut sampling::generator(SEED, index);
+            let mut normal = || Distribution::<f64>::sample(&StandardNormal, rng);
+            let mut rhos = of_field(&corridor(), 200);
+            for (k, rho) in rhos.iter_mut().enumerate() {
+                *rho = if k >= 180 { 5.0 } else { *rho + 0.1 * normal() };
+            }
+            // Both views have the noise, and all of it is in the second.
+            let off: Vec<[f64; 2]> =
+                (0..200).map(|_| [0; 2].map(|_| 2_f64.sqrt() * SIGMA * normal())).collect();
+            let likelihood = likelihood(&rhos, &t_21, |k| off[k], SIGMA);
+            let terms = terms(&likelihood);
+            let start = DepthField::start(turn(), t_21 * 0.8, 0.2);
+            let before = start.worth(&Sums::new(&start, &terms, &likelihood), &precisions());
+            let found = start.fit(&terms, &likelihood, 20).unwrap();
+            let sums = Sums::new(&found.at, &terms, &likelihood);
+            assert!(found.at.worth(&sums, &precisions()) > before, "{index}");
+            // Another step would gain nothing.
+            let factor = regularised(&sums, &precisions()).unwrap();
+            let step = found.at.step(&sums, &precisions(), &factor).unwrap();
+            assert!(factor.l().tr_mul(&step).norm_squared() < 0.1, "{index}: {step}");
+            let surprise = found.at.surprise(&precisions());
+            assert!((found.nats - (without_two(&sums.nats) - surprise)).abs() < 1e-9 && surprise > 0.0);
+            // Twenty near points less those that are chance, of two hundred.
+            assert!((found.at.near - 0.08).abs() < 0.02, "{index}: {}", found.at.near);
+            assert!(
+                (found.at.square_spread.sqrt() - 0.1).abs() < 0.06,
+                "{index}: {}",
+                found.at.square_spread
+            );
+            assert!(found.at.t_21.angle(&t_21) < 0.15, "{index}: {}", found.at.t_21);
+            assert!((found.at.field - corridor()).norm() < 0.35, "{index}: {}", found.at.field);
+            // The unit of length is the mean inverse depth, which the field tells as well as its own size.
+            let turn = (turn() * found.at.q_21.inverse()).scaled_axis();
+            let by = t_21 * (found.at.t_21.norm() / t_21.norm()) - found.at.t_21;
+            let by = nalgebra::Vector6::new(turn.x, turn.y, turn.z, by.x, by.y, by.z);
+            let covariance: Matrix6<f64> = found.covariance.fixed_view::<6, 6>(0, 0).into_owned();
+            all += by.dot(&covariance.cholesky().unwrap().solve(&by)) / 10.0;
+        }
+        // Five degrees of freedom, of which the mean of ten scatters by one.
+        assert!((1.5..9.0).contains(&all), "{all}");
+    }
+
+    #[test]
+    fn without_near_points_their_share_is_the_least() {
+        let t_21 = Vector3::new(0.02, -0.01, 0.015);
+        let likelihood = likelihood(&of_field(&corridor(), 100), &t_21, |_| [0.0; 2], SIGMA);
+        let terms = terms(&likelihood);
+        let found = DepthField::start(turn(), t_21, 0.2).fit(&terms, &likelihood, 10).unwrap();
+        assert!((found.at.near - LEAST_NEAR).abs() <= 0.0, "{}", found.at.near);
+        // Two that are the same as far as they tell, and two that are not.
+        let deviation = found.covariance[(3, 3)].sqrt();
+        let moved = |by: f64| DepthField {
+            t_21: found.at.t_21 + Vector3::x() * (by * deviation),
+            ..found.at.clone()
+        };
+        assert!(moved(0.4).is_near(&found) && !moved(0.6).is_near(&found));
+    }
+
+    /// Where the matches say nothing more, a length is what makes the spread the usual one.
+    #[test]
+    fn a_length_goes_where_the_spread_is_usual() {
+        let sums = Sums {
+            across: Matrix6::identity(),
+            along: Equations::identity(),
+            gradient: Parameters::zeros(),
+            usual: 100.0,
+            near: 0.0,
+            square_spread: 0.0,
+            share: 0.0,
+            nats: Vec::new(),
+        };
+        let precisions = precisions();
+        let along = |spread: f64| {
+            let at = DepthField::start(turn(), Vector3::new(0.0, 2.0, 0.0), spread);
+            let step = at.step(&sums, &precisions, &regularised(&sums, &precisions).unwrap()).unwrap();
+            assert!(step.iter().enumerate().all(|(k, x)| k == 4 || x.abs() <= 1e-15), "{step}");
+            step[4]
+        };
+        assert!(along(USUAL_SPREAD).abs() < 1e-12);
+        // ln(e²) / 2 / 0.5² = 4 along t/|t|², of which the variance is half of a quarter; the step is half of it.
+        let expected = 0.5 * 0.5 * 4.0 / (1.0 + 4.0 * 0.125);
+        assert!(
+            (along(USUAL_SPREAD * 1_f64.exp()) - expected).abs() < 1e-6,
+            "{}",
+            along(USUAL_SPREAD * 1_f64.exp())
+        );
+        assert!((along(USUAL_SPREAD * (-1_f64).exp()) + expected).abs() < 1e-6);
+    }
+}

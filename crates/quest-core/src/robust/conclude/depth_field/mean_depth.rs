@@ -90,3 +90,110 @@ fn mean_depth(at: &DepthField, terms: &[Terms], likelihood: &Likelihood) -> Opti
         variance: (UNKNOWN * (unknown / weights + at.near)).powi(2) + of_each / (weights * weights),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+    use crate::robust::conclude::depth_field::field::{Field, terms};
+    use crate::robust::conclude::depth_field::planted::{likelihood, of_field, turn};
+
+    const COUNT: usize = 43;
+
+    fn start(t_21: Vector3<f64>, spread: f64) -> DepthField {
+        DepthField { near: 0.0, ..DepthField::start(turn(), t_21, spread) }
+    }
+
+    /// Inverse depths without a pattern in the image.
+    fn scattered() -> Vec<f64> {
+        (0..COUNT).map(|k| 1.0 + 0.3 * (7.0 * k as f64).sin()).collect()
+    }
+
+    /// A pose with one parameter changed.
+    fn moved(at: &DepthField, k: usize, by: f64) -> DepthField {
+        let mut at = at.clone();
+        match k {
+            0..3 => {
+                let mut turn = Vector3::zeros();
+                turn[k] = by;
+                at.q_21 = UnitQuaternion::new(turn) * at.q_21;
+            }
+            3..6 => at.t_21[k - 3] += by,
+            _ => at.field[k - 6] += by,
+        }
+        at
+    }
+
+    #[test]
+    fn where_depths_are_seen_well_their_mean_is_measured() {
+        // To the side: what moves points is linear in their inverse depths.
+        let t_21 = Vector3::new(0.15, -0.05, 0.0);
+        let rhos = scattered();
+        // A spread of twenty pixels along the lines beside noise of a hundredth: the matches say all of the depths.
+        let at = start(t_21, 0.2);
+        let likelihood = likelihood(&rhos, &t_21, |_| [0.0; 2], 0.01);
+        let terms = terms(&likelihood);
+        let mean = |at: &DepthField| mean_depth(at, &terms, &likelihood).unwrap();
+        let found = mean(&at);
+        let expected = rhos.iter().map(|rho| 1.0 / rho).sum::<f64>() / COUNT as f64;
+        assert!((found.value / expected - 1.0).abs() < 1e-5, "{} {expected}", found.value);
+        assert!(found.slope.fixed_rows::<TERMS>(6).amax() < 1e-4 && found.variance < 1e-6);
+        for k in 0..6 {
+            let step = 1e-6;
+            let derivative =
+                (mean(&moved(&at, k, step)).value - mean(&moved(&at, k, -step)).value) / (2.0 * step);
+            // A turn changes what whitens a residual by the residual over the focal length, a tenth at most.
+            let tolerance = if k < 3 { 0.1 } else { 1e-3 } * found.slope.fixed_rows::<6>(0).amax();
+            assert!((found.slope[k] - derivative).abs() < tolerance, "{k}: {} {derivative}", found.slope[k]);
+        }
+    }
+
+    #[test]
+    fn where_depths_are_not_seen_their_mean_is_that_of_the_field() {
+        let t_21 = Vector3::new(0.05, -0.02, 0.03);
+        let field = Field::from_fn(|k, _| 0.02 * (k as f64).cos());
+        let rhos = of_field(&field, COUNT);
+        let at = DepthField { field, ..start(t_21, 0.0) };
+        let likelihood = likelihood(&rhos, &t_21, |_| [0.0; 2], 0.5);
+        let terms = terms(&likelihood);
+        let mean = |at: &DepthField| mean_depth(at, &terms, &likelihood).unwrap();
+        let found = mean(&at);
+        let expected = rhos.iter().map(|rho| 1.0 / rho).sum::<f64>() / COUNT as f64;
+        assert!((found.value / expected - 1.0).abs() < 1e-5, "{} {expected}", found.value);
+        assert!(found.slope.fixed_rows::<6>(0).amax() < 1e-12);
+        for k in 6..PARAMETERS {
+            let step = 1e-5;
+            let derivative =
+                (mean(&moved(&at, k, step)).value - mean(&moved(&at, k, -step)).value) / (2.0 * step);
+            assert!((found.slope[k] - derivative).abs() < 1e-5, "{k}: {} {derivative}", found.slope[k]);
+        }
+    }
+
+    #[test]
+    fn what_no_match_says_of_a_mean_depth_is_its_variance() {
+        // Hardly any translation: all depths are the field's, of a spread s, and their mean is 1 + s².
+        let (s, count) = (0.2, COUNT as f64);
+        let likelihood = likelihood(&[1.0; COUNT], &Vector3::zeros(), |_| [0.0; 2], 0.5);
+        let terms = terms(&likelihood);
+        let found = mean_depth(&start(Vector3::x() * 1e-7, s), &terms, &likelihood).unwrap();
+        assert!((found.value - 1.0 - s * s).abs() < 1e-5, "{}", found.value);
+        // Half of what is added is not known, and each depth scatters.
+        let expected = (UNKNOWN * s * s).powi(2) + s * s / count;
+        assert!((found.variance / expected - 1.0).abs() < 1e-4, "{} {expected}", found.variance);
+    }
+
+    #[test]
+    fn near_points_have_their_own_depths() {
+        let t_21 = Vector3::new(0.03, -0.01, 0.0);
+        let rhos: Vec<f64> = (0..COUNT).map(|k| if k % 10 == 3 { 5.0 } else { 1.0 }).collect();
+        let likelihood = likelihood(&rhos, &t_21, |_| [0.0; 2], 0.1);
+        let terms = terms(&likelihood);
+        let at = DepthField { near: 0.1, ..start(t_21, 0.02) };
+        let found = mean_depth(&at, &terms, &likelihood).unwrap();
+        let expected = rhos.iter().map(|rho| 1.0 / rho).sum::<f64>() / COUNT as f64;
+        assert!((found.value / expected - 1.0).abs() < 0.01, "{} {expected}", found.value);
+        let without = mean_depth(&DepthField { near: 0.0, ..at.clone() }, &terms, &likelihood).unwrap();
+        assert!((without.value - 1.0).abs() < 0.01, "{}", without.value);
+    }
+}

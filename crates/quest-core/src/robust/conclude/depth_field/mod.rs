@@ -22,6 +22,8 @@
 mod field;
 mod fit;
 mod mean_depth;
+#[cfg(test)]
+mod planted;
 mod sums;
 
 pub(crate) use field::{DepthField, Terms, terms};

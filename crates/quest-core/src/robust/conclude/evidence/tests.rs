@@ -122,3 +122,62 @@ fn a_camera_that_stands_still_has_no_evidence() {
     assert!((without_two(&[-1.0, -2.0]) + 3.0).abs() < 1e-15);
     assert!((without_two(&[-1.0, 4.0, -2.0]) + 3.0).abs() < 1e-15);
 }
+
+/// Points around an inverse depth of one, one in ten a near one, and one in five false: EM finds the numbers that they were made with.
+#[test]
+fn rounds_find_where_most_inverse_depths_are() {
+    let rng = &mut sampling::generator(0xe71d, 1);
+    let mut normal = |deviation: f64| deviation * Distribution::<f64>::sample(&StandardNormal, rng);
+    let (spread, step) = (0.2, Vector3::new(0.03, -0.01, 0.02));
+    let all = (0..1_000).map(|k| {
+        let place = f64::from(k);
+        let x1 = Vector3::new(0.5 * (2.1 * place).sin(), 0.5 * (3.7 * place).cos(), 1.0);
+        let rho = if k % 10 == 0 { 5.0 } else { 1.0 + normal(spread) };
+        let seen = x1 + step * rho;
+        let seen = if k % 5 == 1 {
+            [0.5 * (1.3 * place).sin(), 0.5 * (5.1 * place).cos()]
+        } else {
+            [seen.x / seen.z, seen.y / seen.z]
+        };
+        // Both views have the noise, and all of it is in the second; one keypoint in ten is less sharp.
+        let sigma = 2_f64.sqrt() * if k % 10 == 7 { 3.0 } else { 1.0 } * SIGMA;
+        Correspondence::from_image_points([x1.x, x1.y], seen.map(|x| x + normal(sigma / FOCAL))).unwrap()
+    });
+    let matches: Vec<_> = all.collect();
+    let all: Vec<u32> = (0..1_000).collect();
+    let observations = Observations::new(&matches, all.clone(), [[FOCAL; 2]; 2], 1.5);
+    let still = UnitQuaternion::identity();
+    let likelihood = Likelihood::new(&observations, &all, &still, SIGMA, 0.8);
+    let r_21 = rows(&still.to_rotation_matrix().into_inner());
+    let all = widest(Splitting { likelihood: &likelihood, r_21, t_21: step.into() });
+    let first = likelihood.first_depths(&all);
+    // By median and quartiles, near points and all.
+    assert!((first.mean - 1.0).abs() < 0.1 && (first.square_spread.sqrt() - spread).abs() < 0.1, "{first:?}");
+    let found = (0..30).fold(first, |depths, _| likelihood.next_depths(&all, &depths));
+    // Three deviations of 700 points, and of 100 near ones among 800.
+    assert!((found.mean - 1.0).abs() < 0.03, "{found:?}");
+    assert!((found.square_spread.sqrt() - spread).abs() < 0.03, "{found:?}");
+    assert!((found.near - 0.125).abs() < 0.04, "{found:?}");
+    // From anywhere else the same.
+    let elsewhere = Depths { mean: 1.6, square_spread: 0.3, near: 0.4 };
+    let other = (0..60).fold(elsewhere, |depths, _| likelihood.next_depths(&all, &depths));
+    assert!((other.mean - found.mean).abs() < 1e-3 && (other.near - found.near).abs() < 1e-3, "{other:?}");
+}
+
+#[test]
+fn a_match_is_true_as_likely_as_its_densities_say() {
+    let step = Vector3::new(0.15, -0.05, 0.05);
+    let (likelihood, q_21) = likelihood(&step);
+    let r_21 = rows(&q_21.to_rotation_matrix().into_inner());
+    let all = widest(Splitting { likelihood: &likelihood, r_21, t_21: step.into() });
+    let depths = Depths { near: 0.0, ..likelihood.first_depths(&all) };
+    let [is_true, nats] = widest(Probabilities { likelihood: &likelihood, all: &all, depths });
+    let floor = likelihood.densities.floor;
+    for ((is_true, nats), still) in is_true.iter().zip(&nats).zip(&likelihood.still) {
+        for j in 0..WIDTH {
+            assert!((0.0..=1.0).contains(&is_true[j]), "{}", is_true[j]);
+            let density = nats[j].exp() / still[j];
+            assert!((density * (1.0 - is_true[j]) / floor - 1.0).abs() < 1e-9, "{density} {}", is_true[j]);
+        }
+    }
+}

@@ -127,6 +127,10 @@ fn points_that_are_seen_badly_count_as_many_where_their_median_is_clear() {
     // Where it is not clear they are left out.
     let unseen = by_depths(&well, &vec![point(0.1, 4.0); 100], &no_chance());
     assert!((unseen.value - 1.0).abs() < 1e-4);
+    // Depths of 0.5 and 1.5. As many others, which may all be in one place, have a mean that is off by half of that deviation.
+    let both: Vec<_> = (0..100).map(|k| point(if k % 2 == 0 { 2.0 } else { 2.0 / 3.0 }, 1e-9)).collect();
+    let unseen = by_depths(&both, &vec![point(0.1, 4.0); 100], &no_chance());
+    assert!((unseen.variance / (0.5_f64 * 0.5).powi(2) - 1.0).abs() < 1e-3, "{}", unseen.variance);
     // A hundredth of the points at the horizon: five times as far away as most.
     let mut far = vec![point(1.0, 1e-6); 99];
     far.push(point(1e-9, 1e-6));
@@ -140,6 +144,9 @@ fn points_that_are_seen_badly_count_as_many_where_their_median_is_clear() {
     let [clear, rest] =
         seen_well_or_badly([well, vec![point(0.5, 0.05); 80], vec![point(0.9, 0.5); 10]].concat());
     assert_eq!([clear.len(), rest.len()], [100, 90]);
+    // A usual depth stands clear by twice as many deviations as it takes: of a sixth of it.
+    let limits = [vec![point(1.0, 0.027); 60], vec![point(1.0, 0.029); 50]].concat();
+    assert_eq!(seen_well_or_badly(limits).map(|some| some.len()), [60, 50]);
     // Few are seen well: those that stand clear themselves.
     let [clear, rest] = seen_well_or_badly([vec![point(1.0, 0.05); 30], vec![point(1.0, 0.5); 10]].concat());
     assert_eq!([clear.len(), rest.len()], [30, 10]);
@@ -176,6 +183,13 @@ fn the_spread_of_logarithms_is_found_beside_the_noise() {
         assert!((found - spread * spread).abs() < 0.04, "{spread} {noise}: {found}");
     }
     assert!(square_of_logarithms(&[point(1.0, 0.0)], -1.0) <= 0.0);
+    // The unit of the depths does not matter.
+    let of_unit = |unit: f64| {
+        let points: Vec<_> =
+            (0..40).map(|k| point(unit * (0.8 + 0.01 * f64::from(k)), 1e-4 * unit * unit)).collect();
+        square_of_logarithms(&points, unit)
+    };
+    assert!(of_unit(1.0) > 0.01 && (of_unit(4.0) / of_unit(1.0) - 1.0).abs() < 1e-12);
 }
 
 #[test]

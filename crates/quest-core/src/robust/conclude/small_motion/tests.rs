@@ -113,3 +113,27 @@ fn a_few_near_points_tell_the_direction_and_its_sign() {
     let observations = Observations::new(&still, (0..20).collect(), [[900.0; 2]; 2], 1.5);
     assert!(direction_of_pairs(&observations, &UnitQuaternion::identity(), 0.5).is_none());
 }
+
+#[test]
+fn a_direction_and_its_opposite_take_points_to_either_side() {
+    let step = Vector3::new(0.1, -0.02, 0.03);
+    let all = (0..20).map(|k| {
+        let place = f64::from(k);
+        let x1 = Vector3::new(0.5 * (2.1 * place).sin(), 0.4 * (3.7 * place).cos(), 1.0);
+        // Three in four points are moved by the step, the others by its opposite.
+        let seen = x1 * 4.0 + if k % 4 == 0 { -step } else { step };
+        Correspondence::from_image_points([x1.x, x1.y], [seen.x / seen.z, seen.y / seen.z]).unwrap()
+    });
+    let matches: Vec<_> = all.collect();
+    let all: Vec<u32> = (0..20).collect();
+    let observations = Observations::new(&matches, all.clone(), [[900.0; 2]; 2], 1.5);
+    let displacements = observations.framed(&all).displacements(&Matrix3::identity());
+    let blocks: Vec<Off> = displacements.chunks(WIDTH).map(Off::new).collect();
+    let sides = |direction: Vector3<f64>| {
+        widest(Sides { blocks: &blocks, direction: direction.normalize().into(), sigma: 0.5 })
+    };
+    assert_eq!((sides(step), sides(-step)), ([15.0, 5.0], [5.0, 15.0]));
+    // No point goes so far to the side of its line.
+    let [plus, minus] = sides(Vector3::new(0.02, 0.1, 0.0));
+    assert!(plus + minus < 10.0, "{plus} {minus}");
+}

@@ -60,3 +60,17 @@ impl Image {
         self.frame.iter().flatten().count()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_explains_a_cost_up_to_so_many_deviations() {
+        let setting =
+            Setting { goal: Vec::new(), options: FilterOptions { gate: 4.0, ..FilterOptions::default() } };
+        // A hundred degrees of freedom have the deviation √200; one more is for few features.
+        let limit = 100.0 + 4.0 * (200_f64.sqrt() + 1.0);
+        assert!(setting.passes(limit - 1e-9, 53) && !setting.passes(limit + 1e-9, 53));
+    }
+}

@@ -409,4 +409,37 @@ mod tests {
         assert_eq!((fit.seen, fit.inliers), (12, 11));
         assert!(fit.pose.q_21.angle() < 1e-9 && fit.pose.t_21.norm() < 1e-9);
     }
+
+    #[test]
+    fn a_feature_of_unknown_depth_counts_across_its_epipolar_line_alone() {
+        let (r_21, t_21) = (Matrix3::identity(), Vector3::new(0.3, 0.2, -0.1));
+        let point = Point { place: [0.2, -0.1], rho: 0.5, variance: 1e6, is_mapped: true };
+        let task = Task {
+            variance: 1e-6,
+            place_variance: 0.0,
+            ground: None,
+            is_translation_fixed: false,
+            mapped_only: false,
+            depth_variance: None,
+            iterations: 1,
+        };
+        let seen = |rho: f64, off: [f64; 2]| {
+            let x2 = Vector3::new(0.2, -0.1, 1.0) + t_21 * rho;
+            [x2.x / x2.z + off[0], x2.y / x2.z + off[1]]
+        };
+        let square = |z: [f64; 2], task: &Task| look(&point, z, &r_21, &t_21, task).unwrap().square;
+        // Three deviations across the line that leads to the same point at another depth.
+        let [a, b] = [0.5, 0.5 + 1e-6].map(|rho| seen(rho, [0.0; 2]));
+        let (along, length) = ([b[0] - a[0], b[1] - a[1]], (b[0] - a[0]).hypot(b[1] - a[1]));
+        let across = [-along[1] / length * 3e-3, along[0] / length * 3e-3];
+        assert!((square(seen(0.5, across), &task) - 9.0).abs() < 1e-3);
+        // At another depth nothing is off, unless the depth is known.
+        assert!(square(seen(0.6, [0.0; 2]), &task) < 1e-3);
+        let known = Task { depth_variance: Some(0.0), ..task };
+        assert!(square(seen(0.6, [0.0; 2]), &known) > 100.0);
+        // Of a place in the goal that is as uncertain as that in the image, the noise is about twice as large.
+        let both = Task { place_variance: 1e-6, ..known };
+        let ratio = square(seen(0.5, across), &both) / square(seen(0.5, across), &known);
+        assert!((ratio - 0.5).abs() < 0.1, "{ratio}");
+    }
 }

@@ -197,3 +197,18 @@ fn exploring_goes_ahead_and_back_in_turn() {
         assert_eq!(law.exploration(attempt), Twist::drive(expected, 0.0), "{attempt}");
     }
 }
+
+#[test]
+fn the_direction_to_the_goal_is_that_in_the_frame_of_the_goal() {
+    for (position, heading) in
+        [([-0.5, -2.0], 0.2), ([-0.5, -2.0], -0.7), ([1.0, -0.5], 0.4), ([0.0, -1.0], 1.0)]
+    {
+        let [x, z] = position;
+        // A turn to the right takes what is ahead to the left.
+        let q_21 = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), -heading);
+        let pose = RelativePose::new(q_21, q_21 * nalgebra::Vector3::new(-x, 0.0, -z));
+        let planar = PlanarPose::new(&pose);
+        assert!((planar.heading - heading).abs() < 1e-12, "{planar:?}");
+        assert!((planar.direction() - (-x).atan2(-z)).abs() < 1e-12, "{planar:?}");
+    }
+}
