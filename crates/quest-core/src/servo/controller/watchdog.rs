@@ -115,4 +115,15 @@ mod tests {
         assert!(diverges_by(|k| 0.2 * seen(k), seen, 0.0));
         assert!(diverges_by(|_| 0.2, |_| 0.2, 0.0));
     }
+
+    #[test]
+    fn a_window_ends_with_the_commanded_way() {
+        // Of a potential of 0.09 a share of 0.3 of the way is 0.09: nine images of a hundredth, but it takes fifteen.
+        for (step, judged_at) in [(0.01, 15), (0.0031, 30), (0.0, i32::MAX)] {
+            let mut watchdog = Watchdog::default();
+            let motion = Motion { linear: Vector3::x() * step, angular: Vector3::zeros() };
+            let found = (0..200).find(|_| watchdog.is_diverging(Some(0.09), 0.09, 0.0, &motion));
+            assert_eq!(found.unwrap_or(i32::MAX), judged_at, "{step}");
+        }
+    }
 }
