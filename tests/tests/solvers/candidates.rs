@@ -19,8 +19,9 @@ use super::{
 
 /// What section 7.1 finds for a problem. All solvers are asked the same problems, and this takes longer than they do: each is solved once.
 fn real_solutions(problem: &[Match; 5]) -> Vec<UnitQuaternion<f64>> {
-    static KNOWN: LazyLock<Mutex<HashMap<Vec<u64>, Vec<UnitQuaternion<f64>>>>> =
-        LazyLock::new(Mutex::default);
+    // By the bits of the problem.
+    type Solutions = HashMap<Vec<u64>, Vec<UnitQuaternion<f64>>>;
+    static KNOWN: LazyLock<Mutex<Solutions>> = LazyLock::new(Mutex::default);
     let key: Vec<u64> =
         problem.iter().flat_map(|(a, b)| a.iter().chain(b.iter()).map(|x| x.to_bits())).collect();
     let known = KNOWN.lock().unwrap().get(&key).cloned();
