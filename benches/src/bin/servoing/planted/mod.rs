@@ -11,7 +11,7 @@ use std::convert::Infallible;
 use quest_benches::parallel;
 use quest_benches::statistics::{percentile, sorted};
 use quest_core::RelativePose;
-use quest_core::servo::{Record, Step};
+use quest_core::servo::{Estimate, Record, Step};
 
 use cells::cells;
 use run::Outcome;
@@ -57,9 +57,10 @@ fn line(record: &Record) -> String {
     let degrees = |pose: &RelativePose| pose.q_21.angle().to_degrees();
     let estimated = estimate.as_ref().map_or(String::new(), |e| {
         format!(
-            "estimate {} cm {:.1}°, {} alive",
+            "estimate {} cm {:.1}°, {:.1} σ, {} alive",
             cm(e.pose.t_21 * scenes::UNIT),
             degrees(&e.pose),
+            deviations(e),
             e.alternatives
         )
     });
@@ -75,6 +76,13 @@ fn line(record: &Record) -> String {
         command.angular.norm().to_degrees(),
         if status.border_limits { ", border" } else { "" },
     )
+}
+
+/// How many standard deviations the pose is from the goal's.
+fn deviations(estimate: &Estimate) -> f64 {
+    let t_21 = &estimate.pose.t_21;
+    let information = estimate.covariance.and_then(|c| c.fixed_view::<3, 3>(3, 3).try_inverse());
+    information.map_or(f64::NAN, |m| t_21.dot(&(m * t_21)).sqrt())
 }
 
 fn print_row(name: &str, count: usize, outcomes: &[Outcome]) {

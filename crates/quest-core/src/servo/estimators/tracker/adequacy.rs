@@ -27,6 +27,9 @@ impl Workspace {
         // The weight of a match that is 5.3 standard deviations off.
         const HARDLY: f64 = 0.1;
         let feature = &self.features[i];
+        if point.is_wrong {
+            return false;
+        }
         if feature.is_used { feature.weight > HARDLY } else { point.is_mapped }
     }
 

@@ -9,8 +9,6 @@ use crate::servo::estimators::tracker::{Phase, Tracker};
 /// A key image is this far from all others and from the goal, in the unit of the depths. Near the goal there are none, so that the
 /// map cannot drift there.
 const KEY_DISTANCE: f64 = 0.04;
-/// Steps after a new key image at most.
-const STEPS: usize = 8;
 /// With more features than this an image gives time to one map alone, for a step or a judgement. With a thousand features each of
 /// these takes about a millisecond.
 const MANY: usize = 100;
@@ -30,6 +28,7 @@ impl<S: PoseSource> Tracker<S> {
         }
         self.watch_for_relief();
         self.add_key_image();
+        self.doubt();
         let task = self.task();
         for k in 0..self.count {
             let map = &self.hypotheses[k].map;
@@ -97,13 +96,14 @@ impl<S: PoseSource> Tracker<S> {
         self.keys[slot].frame.copy_from_slice(&self.frame);
         self.keys[slot].variance = self.options.noise.powi(2);
         self.key_count = self.key_count.max(slot + 1);
+        self.doubt.begin();
         for h in &mut self.hypotheses[..self.count] {
             if slot == h.map.keys.len() {
                 h.map.keys.push(h.pose);
             } else {
                 h.map.keys[slot] = h.pose;
             }
-            (h.map.cost, h.map.steps_left, h.map.damping) = (f64::NAN, STEPS, 1e-4);
+            h.map.unsettle(1e-4);
         }
     }
 
@@ -144,7 +144,7 @@ impl<S: PoseSource> Tracker<S> {
         let enough = well >= 7 && 10 * well >= 6 * all && evidence > EVIDENCE && chi < 2.0 * well as f64;
         if enough && !h.is_relief {
             h.map.relief = PLANE_RELIEF;
-            (h.map.cost, h.map.steps_left, h.map.damping) = (f64::NAN, STEPS, 1e-3);
+            h.map.unsettle(1e-3);
         }
     }
 
@@ -175,6 +175,6 @@ fn give_relief(h: &mut super::Hypothesis, relief: f64) {
     h.map.relief = relief;
     (h.is_relief, h.off_map) = (true, 0.0);
     h.map.points.iter_mut().for_each(|p| p.variance = relief * relief);
-    (h.map.cost, h.map.steps_left, h.map.damping) = (f64::NAN, STEPS, 1e-3);
+    h.map.unsettle(1e-3);
     debug_assert!(relief > PLANE_RELIEF && INLIER > OFF);
 }

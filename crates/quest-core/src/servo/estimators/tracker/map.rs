@@ -12,6 +12,9 @@ pub(crate) const PLANE_UNIT: f64 = 0.02;
 /// How far the inverse depths of a plane are off it: a hundredth, the relief of a poster.
 pub(crate) const PLANE_RELIEF: f64 = 0.01;
 
+/// Steps after a change at most.
+const STEPS: usize = 8;
+
 /// An image that the map is adjusted to; all hypotheses share it.
 #[derive(Clone, Debug)]
 pub(crate) struct KeyImage {
@@ -46,8 +49,13 @@ pub(crate) struct Map {
 
 impl Map {
     pub(crate) fn new(goal: &[[f64; 2]], most_keys: usize, relief: f64) -> Self {
-        let point =
-            |place: &[f64; 2]| Point { place: *place, rho: 1.0, variance: relief * relief, is_mapped: false };
+        let point = |place: &[f64; 2]| Point {
+            place: *place,
+            rho: 1.0,
+            variance: relief * relief,
+            is_mapped: false,
+            is_wrong: false,
+        };
         Self {
             points: goal.iter().map(point).collect(),
             normal: Vector3::z(),
@@ -71,7 +79,7 @@ impl Map {
         self.is_to_be_judged = false;
         for ((point, place), known) in self.points.iter_mut().zip(goal).zip(known) {
             let (rho, variance) = known.map_or((1.0, relief * relief), |k| (k.rho, k.variance));
-            *point = Point { place: *place, rho, variance, is_mapped: known.is_some() };
+            *point = Point { place: *place, rho, variance, is_mapped: known.is_some(), is_wrong: false };
         }
     }
 
@@ -82,6 +90,18 @@ impl Map {
         (self.normal, self.relief, self.damping) = (other.normal, other.relief, other.damping);
         (self.cost, self.steps_left, self.adequacy) = (other.cost, other.steps_left, other.adequacy);
         (self.log_information, self.is_to_be_judged) = (other.log_information, other.is_to_be_judged);
+    }
+
+    /// Says whether a feature is a wrong match. Either way what was learnt of its depth is forgotten.
+    pub(crate) fn set_wrong(&mut self, i: usize, is_wrong: bool, goal: &[[f64; 2]], known: &[Option<Known>]) {
+        let unknown = Known { rho: self.on_plane(goal[i]), variance: self.relief * self.relief };
+        let Known { rho, variance } = known[i].unwrap_or(unknown);
+        self.points[i] = Point { place: goal[i], rho, variance, is_wrong, ..self.points[i] };
+    }
+
+    /// Lets it settle anew.
+    pub(crate) fn unsettle(&mut self, damping: f64) {
+        (self.cost, self.steps_left, self.damping) = (f64::NAN, STEPS, damping);
     }
 
     pub(crate) fn is_planar(&self) -> bool {

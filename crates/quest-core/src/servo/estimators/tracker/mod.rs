@@ -19,6 +19,7 @@
 mod adequacy;
 mod adjust;
 mod consensus;
+mod doubt;
 mod follow;
 mod hypothesis;
 mod learn;
@@ -35,6 +36,7 @@ use crate::servo::estimators::estimate::{Estimate, HoldReason, Motion, PoseEstim
 use crate::servo::estimators::source::PoseSource;
 use adjust::{Survey, Workspace};
 use consensus::FEW;
+use doubt::Doubt;
 use hypothesis::Hypothesis;
 use map::{KeyImage, Known, Map};
 use resection::{Ground, Task};
@@ -105,6 +107,7 @@ pub struct Tracker<S> {
     travel: Vector3<f64>,
     /// How often each feature has agreed of late, from zero to one.
     trust: Vec<f64>,
+    doubt: Doubt,
     inliers: Vec<bool>,
     squares: Vec<f64>,
     scratch: Vec<f64>,
@@ -136,6 +139,7 @@ impl<S: PoseSource> Tracker<S> {
         let empty = Hypothesis::new(Map::new(goal, most_keys, options.spread));
         let most = if n < FEW { MOST_OF_FEW } else { MOST_OF_MANY };
         let mut start = Start::new(&empty, options.first_images);
+        let doubt = Doubt::new(&empty.map, most_keys);
         let mut hypotheses = vec![empty; most];
         // Copies of an empty list have no room.
         for h in hypotheses.iter_mut().chain(&mut start.pool) {
@@ -157,6 +161,7 @@ impl<S: PoseSource> Tracker<S> {
             motion: Motion { linear: Vector3::zeros(), angular: Vector3::zeros() },
             travel: Vector3::zeros(),
             trust: vec![1.0; n],
+            doubt,
             inliers: vec![false; n],
             squares: vec![f64::NAN; n],
             scratch: Vec::with_capacity(n),
@@ -214,7 +219,8 @@ impl<S: PoseSource> Tracker<S> {
 
     fn points(&self) -> impl Iterator<Item = Option<&resection::Point>> {
         let known = (self.count > 0 && self.phase == Phase::Mapped).then(|| &self.hypotheses[0].map.points);
-        (0..self.goal.len()).map(move |i| known.and_then(|points| points.get(i)).filter(|p| p.is_mapped))
+        (0..self.goal.len())
+            .map(move |i| known.and_then(|points| points.get(i)).filter(|p| p.is_mapped && !p.is_wrong))
     }
 
     /// How an image is fitted.
@@ -303,6 +309,7 @@ impl<S: PoseSource> Tracker<S> {
         (self.best_mean, self.worse) = (f64::INFINITY, 0);
         self.has_been_far = false;
         self.trust.fill(1.0);
+        self.doubt.begin();
         if is_rotation {
             let Some(fit) = self.start.rotation else { return Err(HoldReason::Inconsistent) };
             self.phase = Phase::Rotation;

@@ -71,6 +71,7 @@ impl<S: PoseSource> Tracker<S> {
         (self.missed, self.dull, self.contradicted) = (0, 0, 0);
         (self.best_mean, self.worse) = (f64::INFINITY, 0);
         self.trust.fill(1.0);
+        self.doubt.begin();
         self.motion = Motion { linear: Vector3::zeros(), angular: Vector3::zeros() };
         true
     }

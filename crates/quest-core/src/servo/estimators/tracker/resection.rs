@@ -36,6 +36,8 @@ pub(crate) struct Point {
     pub(crate) variance: f64,
     /// Whether the map has seen it outside of the goal image, or its depth was given.
     pub(crate) is_mapped: bool,
+    /// Whether it was found to be a wrong match, which has no say in the map.
+    pub(crate) is_wrong: bool,
 }
 
 /// What a pose is held against beside the features.
@@ -333,6 +335,7 @@ mod tests {
             rho: 1.0 + 0.3 * (2.3 * k).sin(),
             variance: 1e-6,
             is_mapped: true,
+            is_wrong: false,
         };
         (0..12).map(|k| point(f64::from(k))).collect()
     }
@@ -413,7 +416,7 @@ mod tests {
     #[test]
     fn a_feature_of_unknown_depth_counts_across_its_epipolar_line_alone() {
         let (r_21, t_21) = (Matrix3::identity(), Vector3::new(0.3, 0.2, -0.1));
-        let point = Point { place: [0.2, -0.1], rho: 0.5, variance: 1e6, is_mapped: true };
+        let point = Point { place: [0.2, -0.1], rho: 0.5, variance: 1e6, is_mapped: true, is_wrong: false };
         let task = Task {
             variance: 1e-6,
             place_variance: 0.0,

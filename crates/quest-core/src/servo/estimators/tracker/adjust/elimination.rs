@@ -34,7 +34,7 @@ impl Workspace {
         self.right[..size].fill(0.0);
         self.begin_with_priors(map, survey);
         for i in 0..map.points.len() {
-            self.features[i].is_used = survey.takes(i);
+            self.features[i].is_used = survey.takes(i, &map.points[i]);
             if self.features[i].is_used {
                 self.eliminate_feature(map, survey, i, damping);
             }

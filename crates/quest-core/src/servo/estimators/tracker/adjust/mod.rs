@@ -18,6 +18,7 @@ use crate::algebra::cholesky;
 use crate::servo::estimators::tracker::map::{KeyImage, Known, Map};
 use crate::servo::estimators::tracker::resection::{Ground, Point, moved};
 use cost::cost;
+pub(crate) use cost::disagreement;
 use elimination::Eliminated;
 
 /// What all hypotheses are adjusted to.
@@ -36,8 +37,13 @@ pub(crate) struct Survey<'a> {
 }
 
 impl Survey<'_> {
-    fn takes(&self, i: usize) -> bool {
-        (self.chosen.is_empty() || self.chosen[i]) && self.keys.iter().any(|key| key.frame[i].is_some())
+    /// Whether this feature takes part, which is the `i`th.
+    fn takes(&self, i: usize, point: &Point) -> bool {
+        self.wants(i, point) && self.keys.iter().any(|key| key.frame[i].is_some())
+    }
+
+    fn wants(&self, i: usize, point: &Point) -> bool {
+        !point.is_wrong && (self.chosen.is_empty() || self.chosen[i])
     }
 }
 
@@ -61,7 +67,7 @@ pub(crate) struct Workspace {
 impl Workspace {
     pub(crate) fn new(features: usize, most_keys: usize) -> Self {
         let size = 6 * most_keys + 3;
-        let empty = Point { place: [0.0; 2], rho: 1.0, variance: 0.0, is_mapped: false };
+        let empty = Point { place: [0.0; 2], rho: 1.0, variance: 0.0, is_mapped: false, is_wrong: false };
         Self {
             size,
             features: vec![Eliminated::default(); features],

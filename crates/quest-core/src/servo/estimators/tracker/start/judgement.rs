@@ -102,7 +102,7 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn new(features: usize) -> Self {
-        let empty = Point { place: [0.0; 2], rho: 1.0, variance: 0.0, is_mapped: false };
+        let empty = Point { place: [0.0; 2], rho: 1.0, variance: 0.0, is_mapped: false, is_wrong: false };
         Self {
             noise: 1.0,
             points: vec![empty; features],
@@ -163,7 +163,7 @@ impl Bench {
             let is_on = off < (free / flat).ln() * flat;
             let (rho, variance) = terms.known[i]
                 .map_or((on_plane, if is_on { flat } else { free }), |known| (known.rho, known.variance));
-            *point = Point { place, rho, variance, is_mapped: chosen[i] };
+            *point = Point { place, rho, variance, is_mapped: chosen[i], is_wrong: false };
         }
         let adjusted = h.map.keys[0];
         residuals(&self.points, &image.frame, &adjusted, &task, &mut self.squares);
@@ -225,7 +225,7 @@ impl Bench {
             let place = terms.goal[i];
             let (rho, variance) =
                 terms.known[i].map_or((h.map.on_plane(place), relief), |known| (known.rho, known.variance));
-            *point = Point { place, rho, variance, is_mapped: chosen[i] };
+            *point = Point { place, rho, variance, is_mapped: chosen[i], is_wrong: false };
         }
         let task = self.task(image, terms);
         let adjusted = h.map.keys[0];
@@ -379,7 +379,7 @@ mod tests {
             .iter()
             .map(|place| {
                 let rho = plane.dot(&Vector3::new(place[0], place[1], 1.0));
-                Point { place: *place, rho, variance: 0.0, is_mapped: true }
+                Point { place: *place, rho, variance: 0.0, is_mapped: true, is_wrong: false }
             })
             .collect();
         let first = Vector3::new(0.19, -0.09, 0.91);

@@ -253,7 +253,7 @@ mod tests {
         // A scene that is reversed leaves them too.
         let best: Vec<Point> = rho
             .iter()
-            .map(|rho| Point { place: [0.0; 2], rho: *rho, variance: 0.0, is_mapped: true })
+            .map(|rho| Point { place: [0.0; 2], rho: *rho, variance: 0.0, is_mapped: true, is_wrong: false })
             .collect();
         let proposal = Proposal { pose: truth(), relief: RELIEF, depths: Depths::Reversed };
         let (found, _) = prepared(&truth(), &proposal, &known, Some(&best)).unwrap();
