@@ -21,6 +21,8 @@ const DOUBTED: f64 = 0.5;
 const AGREES: f64 = 0.6;
 /// A feature that costs less than this is in nobody's way.
 const SUSPECT: f64 = 4.0;
+/// Of six features all are needed.
+const LEAST: usize = 6;
 /// Steps of a trial, and how many an image may take.
 const STEPS: usize = 6;
 const STEPS_OF_AN_IMAGE: usize = 2;
@@ -33,6 +35,8 @@ pub(super) struct Doubt {
     feature: Option<usize>,
     steps: usize,
     was_tried: Vec<bool>,
+    /// All were tried, and nothing was found.
+    is_done: bool,
     /// What was left out since the last key image.
     is_condemned: Vec<bool>,
     /// The feature without which the cost falls furthest, by how much more than chance, and the map without it.
@@ -54,6 +58,7 @@ impl Doubt {
             feature: None,
             steps: 0,
             was_tried: vec![false; n],
+            is_done: false,
             is_condemned: vec![false; n],
             worst: None,
             excess: 0.0,
@@ -69,6 +74,7 @@ impl Doubt {
 
     fn begin_trials(&mut self) {
         self.was_tried.fill(false);
+        self.is_done = false;
         (self.feature, self.worst, self.excess) = (None, None, 0.0);
     }
 }
@@ -83,8 +89,14 @@ impl<S: PoseSource> Tracker<S> {
         if self.hypotheses[0].map.steps_left > 0 {
             self.doubt.begin_trials();
         }
+        let map = &self.hypotheses[0].map;
+        let count = map.points.iter().filter(|point| !point.is_wrong).count();
+        // What is left determines a pose, and more.
+        if self.key_count < 2 || count <= self.least_inliers().max(LEAST) {
+            return;
+        }
         for _ in 0..STEPS_OF_AN_IMAGE {
-            if self.hypotheses[0].map.steps_left == 0 && self.key_count > 1 {
+            if self.hypotheses[0].map.steps_left == 0 && !self.doubt.is_done {
                 self.try_without_one();
             }
         }
@@ -148,6 +160,8 @@ impl<S: PoseSource> Tracker<S> {
             map.unsettle(1e-4);
             (doubt.is_condemned[feature], trust[feature]) = (true, 0.0);
             doubt.begin_trials();
+        } else {
+            doubt.is_done = true;
         }
     }
 }

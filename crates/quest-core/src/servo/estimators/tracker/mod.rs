@@ -9,7 +9,7 @@
 //!    to go where it is sent.
 //! 3. **Gate**: a pose counts if enough features agree with it, and if the camera can have come there since the last image.
 //! 4. **Learn**: an image from somewhere new becomes a key image, and the map is adjusted by one damped step an image until it
-//!    settles (`adjust/`).
+//!    settles (`adjust/`). Of few features a settled map is tried without each, and goes on without a wrong match (`doubt.rs`).
 //! 5. **Judge**: only the rotation counts where the depths are not known well enough for a translation to point the right way
 //!    (`adequacy.rs`).
 //!
