@@ -93,11 +93,11 @@ fn mean_depth(at: &DepthField, terms: &[Terms], likelihood: &Likelihood) -> Opti
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::Vector3;
 
     use super::*;
     use crate::robust::conclude::depth_field::field::{Field, terms};
-    use crate::robust::conclude::depth_field::planted::{likelihood, of_field, turn};
+    use crate::robust::conclude::depth_field::planted::{likelihood, moved, of_field, turn};
 
     const COUNT: usize = 43;
 
@@ -108,21 +108,6 @@ mod tests {
     /// Inverse depths without a pattern in the image.
     fn scattered() -> Vec<f64> {
         (0..COUNT).map(|k| 1.0 + 0.3 * (7.0 * k as f64).sin()).collect()
-    }
-
-    /// A pose with one parameter changed.
-    fn moved(at: &DepthField, k: usize, by: f64) -> DepthField {
-        let mut at = at.clone();
-        match k {
-            0..3 => {
-                let mut turn = Vector3::zeros();
-                turn[k] = by;
-                at.q_21 = UnitQuaternion::new(turn) * at.q_21;
-            }
-            3..6 => at.t_21[k - 3] += by,
-            _ => at.field[k - 6] += by,
-        }
-        at
     }
 
     #[test]

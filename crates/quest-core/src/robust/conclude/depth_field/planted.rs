@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::Correspondence;
-use crate::robust::conclude::depth_field::field::{Field, Terms, terms};
+use crate::robust::conclude::depth_field::field::{DepthField, Field, Terms, terms};
 use crate::robust::conclude::evidence::Likelihood;
 use crate::robust::data::observations::Observations;
 use crate::robust::data::point_transfer::WIDTH;
@@ -46,4 +46,19 @@ pub(super) fn of_field(field: &Field, count: usize) -> Vec<f64> {
     let all: Vec<Terms> = terms(&likelihood(&vec![1.0; count], &Vector3::zeros(), |_| [0.0; 2], 1.0));
     let at = |k: usize| field.iter().zip(&all[k / WIDTH]).map(|(c, lanes)| c * lanes[k % WIDTH]).sum::<f64>();
     (0..count).map(|k| 1.0 + at(k)).collect()
+}
+
+/// A pose with one parameter changed.
+pub(super) fn moved(at: &DepthField, k: usize, by: f64) -> DepthField {
+    let mut at = at.clone();
+    match k {
+        0..3 => {
+            let mut turn = Vector3::zeros();
+            turn[k] = by;
+            at.q_21 = UnitQuaternion::new(turn) * at.q_21;
+        }
+        3..6 => at.t_21[k - 3] += by,
+        _ => at.field[k - 6] += by,
+    }
+    at
 }

@@ -265,6 +265,7 @@ mod tests {
     use super::*;
     use crate::Correspondence;
     use crate::robust::conclude::depth_field::field::{Field, TERMS, terms};
+    use crate::robust::conclude::depth_field::planted::moved;
     use crate::robust::data::observations::Observations;
 
     /// Where points are exactly as far away as the field says and none is near, the likelihood has no variance that depends on the pose,
@@ -298,20 +299,7 @@ mod tests {
         for k in 0..6 + TERMS {
             // The error of a central difference is the third derivative times the square of the step, and rounding over the step.
             let step = if k < 6 { 1e-6 } else { 1e-4 };
-            let moved = |by: f64| {
-                let mut at = at.clone();
-                match k {
-                    0..3 => {
-                        let mut turn = Vector3::zeros();
-                        turn[k] = by;
-                        at.q_21 = UnitQuaternion::new(turn) * at.q_21;
-                    }
-                    3..6 => at.t_21[k - 3] += by,
-                    _ => at.field[k - 6] += by,
-                }
-                nats(&at)
-            };
-            let derivative = (moved(step) - moved(-step)) / (2.0 * step);
+            let derivative = (nats(&moved(&at, k, step)) - nats(&moved(&at, k, -step))) / (2.0 * step);
             // A turn also changes what whitens a residual, by about the residual over the focal length: a few pixels of 500.
             let tolerance = if k < 3 { 1e-2 } else { 1e-6 };
             let size = sums.gradient.norm().max(1.0);

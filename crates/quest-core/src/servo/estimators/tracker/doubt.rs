@@ -127,10 +127,8 @@ impl<S: PoseSource> Tracker<S> {
         let survey = Self::survey(goal, known, &keys[..*key_count], &task);
         let map = &mut hypotheses[0].map;
         if let Some(feature) = doubt.feature {
-            let before = doubt.trial.cost;
-            let falls = workspace.step(&mut doubt.trial, &survey);
+            let is_settled = workspace.settle(&mut doubt.trial, &survey);
             doubt.steps -= 1;
-            let is_settled = falls && before - doubt.trial.cost < 1e-3 * doubt.trial.cost + 1e-3;
             if doubt.steps > 0 && !is_settled {
                 return;
             }

@@ -48,10 +48,9 @@ impl<S: PoseSource> Tracker<S> {
         let survey = Self::survey(&self.goal, &self.known, &self.keys[..self.key_count], task);
         let map = &mut self.hypotheses[k].map;
         if map.steps_left > 0 {
-            let before = map.cost;
-            let falls = self.workspace.step(map, &survey);
+            let is_settled = self.workspace.settle(map, &survey);
             map.steps_left -= 1;
-            if falls && before - map.cost < 1e-3 * map.cost + 1e-3 {
+            if is_settled {
                 map.steps_left = 0;
             }
             map.is_to_be_judged = map.steps_left == 0;

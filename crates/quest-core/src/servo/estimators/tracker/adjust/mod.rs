@@ -104,6 +104,12 @@ impl Workspace {
         falls
     }
 
+    /// One step; whether the map has settled: the cost fell, and by next to nothing.
+    pub(crate) fn settle(&mut self, map: &mut Map, survey: &Survey<'_>) -> bool {
+        let before = map.cost;
+        self.step(map, survey) && before - map.cost < 1e-3 * map.cost + 1e-3
+    }
+
     /// The cost after the step, left in `trial_points`, `trial_keys` and the end of `right`.
     fn try_step(&mut self, map: &Map, survey: &Survey<'_>) -> Option<f64> {
         let size = self.size;

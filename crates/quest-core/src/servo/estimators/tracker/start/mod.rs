@@ -282,11 +282,9 @@ impl Start {
                 (self.is_adjusting, self.steps) = (true, 0);
             }
             let new = &mut self.pool[self.count];
-            let before = new.map.cost;
-            let falls = workspace.step(&mut new.map, &survey);
+            let settled = workspace.settle(&mut new.map, &survey);
             left -= 1;
             self.steps += 1;
-            let settled = falls && before - new.map.cost < 1e-3 * new.map.cost + 1e-3;
             if settled || self.steps >= STEPS || new.map.damping > 1e5 {
                 self.is_adjusting = false;
                 if n >= FEW {
