@@ -21,8 +21,9 @@
 //!    (`search::hypotheses`). Their essential matrices are scored over all matches and dropped as soon as they are most likely worse
 //!    than the best (`search::search_score`); the best are scored as poses, with the depths of their points
 //!    (`search::pose_score`), and refined over their inliers, until the best would have been found again, and any other as
-//!    good (`search::guide`, `search::stopping`).
-//! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`).
+//!    good (`search::guide`, `search::stopping`). A few that are nearly as good are refined too (`search::contenders`).
+//! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`), and
+//!    gives way to another minimum that explains the same matches and is likelier (`conclude::minima`).
 //! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`conclude::plane`). The best is refined once
 //!    more without the matches that agree with it by chance (`conclude::chance_inliers`).
 //! 5. Whether chance explains the inliers (`conclude::false_alarms`). Where a rotation alone leaves little, the likelihood of all

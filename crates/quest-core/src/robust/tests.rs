@@ -91,7 +91,7 @@ fn planes_are_recognised_and_have_two_poses() {
 #[test]
 fn a_small_parallax_may_have_two_minima() {
     let (mut wrong, mut second_is_right) = (0, 0);
-    for index in 0..200 {
+    for index in 0..600 {
         for parallax in [0.01, 0.2] {
             let motion = SceneMotion::Parallax(parallax);
             let (scene, _) = scene(&SceneOptions { motion, ..noisy(100) }, 0.3, 1_000 + index);
@@ -106,7 +106,7 @@ fn a_small_parallax_may_have_two_minima() {
             }
         }
     }
-    assert!(wrong < 20 && 3 * second_is_right > wrong, "{second_is_right} of {wrong}");
+    assert!(wrong < 40 && 3 * second_is_right > wrong, "{second_is_right} of {wrong}");
 }
 
 #[test]

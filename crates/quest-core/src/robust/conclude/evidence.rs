@@ -33,7 +33,7 @@ use crate::solver::shared::motion::Motion;
 
 /// The shares and the widths of the noise: one keypoint in ten is three times less sharp. The decisions are not sensitive to them
 /// between 5 and 20 % and between two and five times.
-const TAILS: [[f64; 2]; 2] = [[0.9, 1.0], [0.1, 3.0]];
+pub(crate) const TAILS: [[f64; 2]; 2] = [[0.9, 1.0], [0.1, 3.0]];
 
 /// The density of near points is flat below this multiple of the noise, where they cannot be told from others.
 const NEAREST: f64 = 3.0;

@@ -11,6 +11,7 @@ pub(crate) mod false_alarms;
 mod final_refinement;
 mod inverse_depth;
 mod length;
+mod minima;
 mod mixture;
 mod model;
 mod plane;
@@ -54,6 +55,7 @@ pub(crate) fn conclude(
 ) -> Result<Estimate, EstimateError> {
     let observations = poses.observations;
     let polished = polish(poses, found.best.motion);
+    let polished = minima::likeliest(poses, polished, found);
     let plane = plane::fit(observations, &polished, rng);
     let others = plane.map_or_else(Vec::new, |plane| alternatives(poses, &plane, &polished));
     let polished = better_of(poses, polished, &others);

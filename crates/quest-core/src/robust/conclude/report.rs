@@ -214,7 +214,7 @@ fn answers(
         Model::General => (*polished.motion(), as_likely(poses, others, polished)),
     };
     if verdict.model != Model::PureRotation && is_few {
-        second = second_of_few(&found.of_few, &motion);
+        second = second_of_few(&found.refined, &motion);
     }
     (motion, second)
 }

@@ -6,6 +6,7 @@
 //! would. Refining every hypothesis that is better than those before it in its block finds no better poses.
 
 mod chart;
+mod contenders;
 mod guide;
 pub(crate) mod hypotheses;
 mod pools;
@@ -27,6 +28,7 @@ use crate::robust::options::{KnownDirection, Options};
 use crate::robust::refine::epipolar::{COARSE, Subset, refine};
 use crate::robust::refine::loss::Biweight;
 use crate::robust::search::chart::chart;
+use crate::robust::search::contenders::{Contenders, NEARLY};
 use crate::robust::search::guide::Guide;
 use crate::robust::search::hypotheses::{Hypotheses, HypothesisSource};
 use crate::robust::search::pose_score::{PoseScorer, Scored, ScoredPose};
@@ -90,8 +92,8 @@ const GUIDED: usize = 2;
 pub(crate) struct SearchResult {
     /// The best pose.
     pub(crate) best: Scored,
-    /// With few matches, every pose that was found, refined.
-    pub(crate) of_few: Vec<Scored>,
+    /// Every pose that was refined: of few matches every pose that was found.
+    pub(crate) refined: Vec<Scored>,
     /// Samples drawn.
     pub(crate) iterations: usize,
     /// As how many uniform samples they count where chance is judged.
@@ -153,8 +155,9 @@ pub(crate) struct Search<'a> {
     best_hypothesis: f64,
     /// The best pose.
     best: Option<Scored>,
-    /// With few matches, every pose that was found, refined.
-    all: Vec<Scored>,
+    /// Every pose that was refined, and the hypotheses that might have been.
+    refined: Vec<Scored>,
+    contenders: Contenders,
     /// Samples drawn, and as how many uniform ones they count where chance is judged.
     iterations: usize,
     tries: usize,
@@ -178,7 +181,8 @@ impl<'a> Search<'a> {
             poses: PoseScorer::new(observations, loss),
             best_hypothesis: observations.len() as f64,
             best: None,
-            all: Vec::new(),
+            refined: Vec::new(),
+            contenders: Contenders::default(),
             iterations: 0,
             tries: 0,
             bests: 0,
@@ -225,12 +229,13 @@ impl<'a> Search<'a> {
             }
             block = BLOCK;
         }
+        self.consider_contenders();
     }
 
     /// What was found, `None` where there is no pose, and the scorer of poses for what follows.
     pub(crate) fn into_result(self) -> (PoseScorer<'a>, Option<SearchResult>) {
-        let Self { poses, best, all, iterations, tries, direction, .. } = self;
-        (poses, best.map(|best| SearchResult { best, of_few: all, iterations, tries, direction }))
+        let Self { poses, best, refined, iterations, tries, direction, .. } = self;
+        (poses, best.map(|best| SearchResult { best, refined, iterations, tries, direction }))
     }
 
     /// Looks at every sample, which costs little where there are few matches.
@@ -313,7 +318,9 @@ impl<'a> Search<'a> {
         }
         let mut best = None;
         for e in hypotheses {
-            if self.scorer.score(e, self.best_hypothesis).is_none() {
+            let Some(cost) = self.scorer.score(e, NEARLY * self.best_hypothesis) else { continue };
+            if cost >= self.best_hypothesis {
+                self.contenders.offer(cost, e);
                 continue;
             }
             let Some(pose) = self.poses.best_pose(e, self.width()) else { continue };
@@ -334,7 +341,7 @@ impl<'a> Search<'a> {
         let pose = self.poses.best_pose(e, self.width());
         let Some(pose) = pose.filter(|pose| self.allows(&pose.scored)) else { return };
         let optimised = self.optimise(pose);
-        self.all.push(optimised);
+        self.refined.push(optimised);
         let order = |s: &Scored| ((s.cost / EQUAL).round(), s.motion.q_21.angle());
         if self.best.is_none_or(|best| order(&optimised) < order(&best)) {
             self.best = Some(optimised);
@@ -346,7 +353,20 @@ impl<'a> Search<'a> {
         let pose = self.poses.score(motion, self.width());
         let optimised = self.optimise(pose);
         if self.allows(&optimised) {
+            self.refined.push(optimised);
             self.keep(optimised);
+        }
+    }
+
+    /// Refines the best of the other hypotheses: they may lead to other minima.
+    fn consider_contenders(&mut self) {
+        let known = self.refined.iter().map(|scored| scored.motion.essential()).collect();
+        let contenders = std::mem::take(&mut self.contenders);
+        for e in contenders.distinct(NEARLY * self.best_hypothesis, known) {
+            let Some(pose) = self.poses.best_pose(&e, self.width()) else { continue };
+            let motion = pose.scored.motion;
+            self.poses.recycle(pose);
+            self.consider_pose(motion);
         }
     }
 
