@@ -52,6 +52,9 @@ fn on_a_line<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> bool {
     nearest_lines(matches).iter().all(|line| line.square_distance < 1e-14)
 }
 
+/// A line is long beside the distances of its points.
+const LONG: f64 = 10.0;
+
 /// Whether all points, or all but one, lie on a line in both images up to these mean distances, in radians. Only noise then
 /// distinguishes them from points that lie on a line exactly.
 pub(crate) fn nearly_on_a_line(matches: &[Correspondence], distances: [f64; 2]) -> bool {
@@ -70,12 +73,21 @@ pub(crate) fn nearly_on_a_line(matches: &[Correspondence], distances: [f64; 2]) 
     nearest_lines(others).iter().zip(distances).all(|(line, d)| line.square_distance < d * d)
 }
 
+/// Whether the points spread far along their lines, by at least [`LONG`] times these distances: of points that are all within a
+/// distance as wide as the image nothing is known.
+pub(crate) fn are_spread_along(matches: &[Correspondence], distances: [f64; 2]) -> bool {
+    let is_long = |(line, d): (&Line, f64)| line.square_spread > (LONG * d).powi(2);
+    nearest_lines(matches.iter()).iter().zip(distances).all(is_long)
+}
+
 /// The line nearest to the points of an image: the plane through the camera nearest to their bearings.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     normal: Vector3<f64>,
     /// The mean over the points, in squared radians.
     square_distance: f64,
+    /// Their variance along the line.
+    square_spread: f64,
 }
 
 fn nearest_lines<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> [Line; 2] {
@@ -89,7 +101,8 @@ fn nearest_lines<'a>(matches: impl Iterator<Item = &'a Correspondence>) -> [Line
     moments.map(|moments| {
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(moments);
         let (smallest, value) = eigenvalues.argmin();
-        Line { normal: eigenvectors.column(smallest).into(), square_distance: value / count }
+        let square_spread = (eigenvalues.sum() - value - eigenvalues.max()) / count;
+        Line { normal: eigenvectors.column(smallest).into(), square_distance: value / count, square_spread }
     })
 }
 
@@ -112,6 +125,8 @@ mod tests {
         some[5] = Correspondence::from_image_points([0.1, -0.4], [0.2, 0.6]).unwrap();
         assert!(!nearly_on_a_line(&some, [1e-3; 2]));
         assert!(!nearly_on_a_line(&with(1e-4), [1e-3, 1e-6]));
+        // They are spread by about 0.2.
+        assert!(are_spread_along(&with(1e-4), [0.01; 2]) && !are_spread_along(&with(1e-4), [0.03; 2]));
     }
 
     #[test]

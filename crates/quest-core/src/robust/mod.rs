@@ -126,8 +126,9 @@ fn answer(
 /// matches, if anything is.
 fn no_pose(observations: &Observations, inliers: usize, false_share: f64) -> EstimateError {
     // Within a threshold as wide as the image all points are on a line.
-    let otherwise = if false_share < options::UNUSUAL && observations.is_line(&observations.first(DIAGNOSED))
-    {
+    let some = observations.first(DIAGNOSED);
+    let is_usual = false_share < options::UNUSUAL;
+    let otherwise = if observations.is_long_line(&some) || is_usual && observations.is_line(&some) {
         InputError::Degenerate(Degeneracy::Collinear).into()
     } else {
         EstimateError::NoPose { inliers, matches: observations.given.len(), false_share }

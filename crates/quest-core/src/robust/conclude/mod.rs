@@ -158,11 +158,11 @@ fn refuse_line(
     false_share: f64,
 ) -> Result<(), EstimateError> {
     let inliers = &polished.pose.inliers;
-    let some = &inliers[..inliers.len().min(DIAGNOSED)];
-    if model == Model::PureRotation || !observations.is_line(&observations.some(some)) {
+    let some = observations.some(&inliers[..inliers.len().min(DIAGNOSED)]);
+    if model == Model::PureRotation || !observations.is_line(&some) {
         return Ok(());
     }
-    if false_share >= UNUSUAL {
+    if false_share >= UNUSUAL && !observations.is_long_line(&some) {
         return Err(no_pose(observations, inliers.len(), false_share));
     }
     Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()))

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::Correspondence;
-use crate::degeneracy::nearly_on_a_line;
+use crate::degeneracy::{are_spread_along, nearly_on_a_line};
 use crate::robust::data::columns::Columns;
 use crate::robust::data::image::{FramedMatch, Image};
 use crate::robust::data::point_transfer::Framed;
@@ -77,8 +77,18 @@ impl<'a> Observations<'a> {
 
     /// Whether nothing but noise, below a threshold in pixels, tells some matches from those of points on a line.
     pub(crate) fn is_line(&self, some: &[Correspondence]) -> bool {
-        let (images, threshold) = (self.columns.images(), self.columns.threshold());
-        nearly_on_a_line(some, images.map(|image| threshold / image.square_focal_length().sqrt()))
+        nearly_on_a_line(some, self.thresholds())
+    }
+
+    /// Whether some matches are spread along a line, which a threshold as wide as the image does not make them.
+    pub(crate) fn is_long_line(&self, some: &[Correspondence]) -> bool {
+        self.is_line(some) && are_spread_along(some, self.thresholds())
+    }
+
+    /// The threshold in both views, in radians.
+    fn thresholds(&self) -> [f64; 2] {
+        let threshold = self.columns.threshold();
+        self.columns.images().map(|image| threshold / image.square_focal_length().sqrt())
     }
 
     /// The area of view 2, in square pixels, over which its points are spread: that of a rectangle, evenly filled, with
