@@ -72,6 +72,10 @@ pub(crate) fn refine_without_chance(
     }
     let motion = best_of(poses, &motion).map_or(*polished.motion(), |best| best.motion);
     let pose = poses.score(motion, poses.threshold());
+    // Hardly any of the matches may be left: then it was not chance that the others agreed.
+    if pose.inliers.len() < FEWEST {
+        return Polished { by_chance: ByChance { matches: Vec::new(), ..by_chance }, ..polished };
+    }
     // Others agree with the refined pose.
     by_chance.matches.append(&mut doubtful(observations, &pose.inliers, &motion, &polished, believed));
     Polished { by_chance, ..polished.with_pose(pose, poses.threshold()) }
