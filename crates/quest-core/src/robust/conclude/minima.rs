@@ -15,6 +15,7 @@
 
 use std::f64::consts::PI;
 
+use crate::algebra::vectors::exponential::{exp, ln};
 use crate::robust::conclude::evidence::TAILS;
 use crate::robust::conclude::final_refinement::{Polished, polish};
 use crate::robust::conclude::inverse_depth::{InverseDepth, Usual};
@@ -128,12 +129,14 @@ impl<'a> Likelihood<'a> {
         let usual = Usual::new(&InverseDepth::all(self.columns, motion, inliers));
         let density = |(i, r): (usize, &f64)| {
             let depth = InverseDepth::new(self.columns, motion, i);
-            let of_tail =
-                |[share, width]: [f64; 2]| share / width * (-0.5 * (r / (width * self.sigma)).powi(2)).exp();
+            let of_tail = |[share, width]: [f64; 2]| {
+                let inverse = 1.0 / (width * self.sigma);
+                share / width * exp(-0.5 * (r * inverse).powi(2))
+            };
             let across: f64 = TAILS.into_iter().map(of_tail).sum();
-            let behind = (-0.5 * depth.value.min(0.0).powi(2) / depth.variance(self.sigma)).exp();
+            let behind = exp(-0.5 * depth.value.min(0.0).powi(2) / depth.variance(self.sigma));
             let along = usual.density(&depth, self.sigma) / depth.precision.sqrt();
-            (self.truth * across * behind * along + self.floor).ln()
+            ln(self.truth * across * behind * along + self.floor)
         };
         pose.residuals().iter().enumerate().take(COMPARED).map(density).sum()
     }
