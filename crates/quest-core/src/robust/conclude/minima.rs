@@ -43,7 +43,7 @@ const MOST: usize = 12;
 const COMPARED: usize = 500;
 
 /// Motions closer than this, in radians, are the same minimum.
-const SAME: f64 = 2e-3;
+const SAME_MINIMUM: f64 = 2e-3;
 
 /// The likeliest of the minima that the search has found: the best by its cost, or one of the others that it refined. They are
 /// compared as the search left them first, and those that are likelier then refined to the end.
@@ -54,12 +54,12 @@ pub(crate) fn likeliest(poses: &mut PoseScorer, best: Polished, found: &SearchRe
     let limit = NEARLY * found.best.cost;
     let mut others: Vec<&Scored> = found.refined.iter().filter(|other| other.cost <= limit).collect();
     others.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let likelihood = Likelihood::new(poses.observations, &best);
+    let likelihood = PoseLikelihood::new(poses.observations, &best);
     let mut known = vec![found.best.motion];
     let mut of_search = None;
     let mut likeliest: Option<(f64, Polished)> = None;
     for other in others {
-        if known.len() > MOST || known.iter().any(|known| is_same(known, &other.motion)) {
+        if known.len() > MOST || known.iter().any(|known| is_same_minimum(known, &other.motion)) {
             continue;
         }
         known.push(other.motion);
@@ -77,8 +77,8 @@ pub(crate) fn likeliest(poses: &mut PoseScorer, best: Polished, found: &SearchRe
     likeliest.map_or(best, |(_, likeliest)| likeliest)
 }
 
-fn is_same(a: &Motion, b: &Motion) -> bool {
-    a.q_21.angle_to(&b.q_21) < SAME && a.direction.dot(&b.direction) > SAME.cos()
+fn is_same_minimum(a: &Motion, b: &Motion) -> bool {
+    a.q_21.angle_to(&b.q_21) < SAME_MINIMUM && a.direction.dot(&b.direction) > SAME_MINIMUM.cos()
 }
 
 /// Whether most of the matches that one of the two explains are explained by the other.
@@ -94,7 +94,7 @@ fn explain_the_same(a: &Polished, b: &Polished) -> bool {
 }
 
 /// The likelihood of a pose, in nats.
-struct Likelihood<'a> {
+struct PoseLikelihood<'a> {
     columns: &'a Columns,
     sigma: f64,
     /// `(1 − ε) / (2 √(2π) σ)` and `ε/A`.
@@ -102,7 +102,7 @@ struct Likelihood<'a> {
     floor: f64,
 }
 
-impl<'a> Likelihood<'a> {
+impl<'a> PoseLikelihood<'a> {
     /// With the noise and the share of true matches of a pose.
     fn new(observations: &'a Observations, pose: &Polished) -> Self {
         let inliers = pose.pose.inliers.len();
@@ -183,7 +183,7 @@ mod tests {
             let before = *best.motion();
             let after = *likeliest(&mut poses, best, &found).motion();
             let error = |motion: &Motion| motion.direction.angle(&scene.truth.t_21);
-            if !is_same(&before, &after) {
+            if !is_same_minimum(&before, &after) {
                 nearer += usize::from(error(&after) < error(&before));
                 farther += usize::from(error(&after) > error(&before));
             }

@@ -5,12 +5,14 @@ use nalgebra::Matrix3;
 
 /// A hypothesis contends if its cost is at most this multiple of the best one's. Five noisy matches make a hypothesis; what
 /// refinement changes of its cost is of that order.
-pub(crate) const NEARLY: f64 = 1.2;
+pub(crate) const CONTENDS: f64 = 1.2;
 
-/// Essential matrices closer than this, as angles in their space, lead to the same minimum. Not sensitive between 0.02 and 0.1.
+/// Essential matrices closer than this, as angles in their space, lead to the same minimum. Not sensitive between 0.02 and
+/// 0.05.
 const APART: f64 = 0.05;
 
-/// So many are kept, and so many of these refined. Both bound the time alone.
+/// So many are kept, and so many of these refined. Both bound the time. Measured: with two refined the AUC of the recorded pairs is 0.07
+/// lower.
 const KEPT: usize = 48;
 const REFINED: usize = 4;
 

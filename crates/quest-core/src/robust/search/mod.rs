@@ -3,7 +3,8 @@
 //! A random sample without outliers still has the noise of five matches. So the best hypothesis of each block of samples is
 //! refined over its inliers if it beats the earlier ones (O. Chum, J. Matas, J. Kittler, *Locally optimized RANSAC*, DAGM 2003).
 //! It has to beat the best hypothesis as that was before its refinement: this leaves more starts for refinement than the refined one
-//! would. Refining every hypothesis that is better than those before it in its block finds no better poses.
+//! would. Refining every hypothesis that is better than those before it in its block finds no better poses. At the end a few that score
+//! nearly as well are refined (`contenders`): they may lead to other minima, among which `conclude::minima` chooses.
 
 mod chart;
 mod contenders;
@@ -28,7 +29,7 @@ use crate::robust::options::{KnownDirection, Options};
 use crate::robust::refine::epipolar::{COARSE, Subset, refine};
 use crate::robust::refine::loss::Biweight;
 use crate::robust::search::chart::chart;
-use crate::robust::search::contenders::{Contenders, NEARLY};
+use crate::robust::search::contenders::{CONTENDS, Contenders};
 use crate::robust::search::guide::Guide;
 use crate::robust::search::hypotheses::{Hypotheses, HypothesisSource};
 use crate::robust::search::pose_score::{PoseScorer, Scored, ScoredPose};
@@ -318,7 +319,7 @@ impl<'a> Search<'a> {
         }
         let mut best = None;
         for e in hypotheses {
-            let Some(cost) = self.scorer.score(e, NEARLY * self.best_hypothesis) else { continue };
+            let Some(cost) = self.scorer.score(e, CONTENDS * self.best_hypothesis) else { continue };
             if cost >= self.best_hypothesis {
                 self.contenders.offer(cost, e);
                 continue;
@@ -362,7 +363,7 @@ impl<'a> Search<'a> {
     fn consider_contenders(&mut self) {
         let known = self.refined.iter().map(|scored| scored.motion.essential()).collect();
         let contenders = std::mem::take(&mut self.contenders);
-        for e in contenders.distinct(NEARLY * self.best_hypothesis, known) {
+        for e in contenders.distinct(CONTENDS * self.best_hypothesis, known) {
             let Some(pose) = self.poses.best_pose(&e, self.width()) else { continue };
             let motion = pose.scored.motion;
             self.poses.recycle(pose);
