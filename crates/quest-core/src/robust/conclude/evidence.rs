@@ -152,7 +152,7 @@ impl Densities {
     fn of_known(&self, square: f64) -> f64 {
         let of_tail = |[share, width]: [f64; 2]| {
             let variance = (width * self.sigma).powi(2);
-            share * (-0.5 * square / variance).exp() / (2.0 * PI * variance)
+            share * exp(-0.5 * square / variance) / (2.0 * PI * variance)
         };
         (1.0 - self.outliers) * TAILS.into_iter().map(of_tail).sum::<f64>() + self.floor
     }
@@ -273,7 +273,7 @@ impl Likelihood {
         let framed = observations.framed(indices);
         let outliers = (1.0 - share).clamp(0.01, 0.99);
         let area = observations.area_of_view2().max((NEAREST * sigma).powi(2)).max(f64::MIN_POSITIVE);
-        let span = (area.sqrt() / (NEAREST * sigma)).max(3.0).ln();
+        let span = ln((area.sqrt() / (NEAREST * sigma)).max(3.0));
         let tails = TAILS.map(|[share, width]| {
             let variance = (width * sigma).powi(2).max(f64::MIN_POSITIVE);
             Tail { variance, inverse: 1.0 / variance, height: share / (2.0 * PI * variance).sqrt() }

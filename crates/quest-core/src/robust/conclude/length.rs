@@ -10,6 +10,7 @@
 
 use nalgebra::{Vector3, Vector5};
 
+use crate::algebra::vectors::exponential::exp;
 use crate::robust::conclude::by_chance::ByChance;
 use crate::robust::conclude::inverse_depth::{Differentiated, InverseDepth};
 use crate::robust::data::columns::Columns;
@@ -195,7 +196,7 @@ fn mean_of_many(badly: &[BothDepths]) -> Option<(f64, f64)> {
 
 /// The share of a normal variable beyond this many standard deviations, by the bound of Mills' ratio.
 fn beyond(deviations: f64) -> f64 {
-    let bound = std::f64::consts::FRAC_2_PI.sqrt() * (-0.5 * deviations * deviations).exp() / deviations;
+    let bound = std::f64::consts::FRAC_2_PI.sqrt() * exp(-0.5 * deviations * deviations) / deviations;
     bound.min(1.0)
 }
 
@@ -268,7 +269,7 @@ fn by_inverse_depths(all: &[BothDepths]) -> Length {
     let of_median = 0.5 * (median(&mut first) + median(&mut second));
     let variance = MEDIAN_VARIANCE * variance / (count * count);
     let (value, slope) = if are_in_front(all) { positive(of_median, variance) } else { (of_median, 1.0) };
-    let shorter = (-0.5 * square_of_logarithms(all, of_median)).exp();
+    let shorter = exp(-0.5 * square_of_logarithms(all, of_median));
     let (value, slope) = (value * shorter, slope * shorter);
     let by_mean = slope / (2.0 * count);
     Length {

@@ -12,6 +12,7 @@
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::RelativePose;
+use crate::algebra::vectors::exponential::exp;
 use crate::robust::conclude::depth_field::Mode;
 use crate::robust::conclude::length::Length;
 use crate::robust::conclude::rotation_alone::NOT_A_ROTATION;
@@ -140,7 +141,7 @@ pub(crate) fn of_length((pose, covariance): Distribution, length: &Length) -> Di
 /// The mean and the covariance of a mixture.
 fn merged(q_21: &UnitQuaternion<f64>, all: &[Component]) -> Distribution {
     let most = all.iter().map(|c| c.nats).fold(f64::NEG_INFINITY, f64::max);
-    let weight = |c: &Component| (POWER * (c.nats - most)).exp();
+    let weight = |c: &Component| exp(POWER * (c.nats - most));
     let sum: f64 = all.iter().map(weight).sum();
     let mean: Vector6<f64> = all.iter().map(|c| c.mean * (weight(c) / sum)).sum();
     let spread = |c: &Component| c.covariance + (c.mean - mean) * (c.mean - mean).transpose();

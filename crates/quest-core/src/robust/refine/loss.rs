@@ -1,5 +1,7 @@
 //! Robust losses for the refinement: a squared residual to its cost and to its weight in the normal equations.
 
+use crate::algebra::vectors::exponential::exp;
+
 /// The 99 % quantile of χ² with two degrees of freedom: what a match counts at most.
 pub(crate) const CAP: f64 = 9.21;
 
@@ -86,7 +88,7 @@ impl HeavyTailed {
         let step = REACH / f64::from(NODES);
         for node in 0..NODES {
             let x = (f64::from(node) + 0.5) * step;
-            let density = std::f64::consts::FRAC_2_PI.sqrt() * (-0.5 * x * x).exp() * step;
+            let density = std::f64::consts::FRAC_2_PI.sqrt() * exp(-0.5 * x * x) * step;
             let square = (sigma * x).powi(2);
             let share = 1.0 / (1.0 + square * self.inverse_square);
             let weight = self.cost_and_weight(square).1;

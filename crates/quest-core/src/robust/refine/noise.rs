@@ -1,5 +1,7 @@
 //! The noise of the inliers.
 
+use crate::algebra::vectors::exponential::exp;
+
 /// The median absolute value of a standard normal variable.
 const MEDIAN_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
@@ -40,7 +42,7 @@ pub(crate) fn estimate(residuals: impl Iterator<Item = f64>, threshold: f64) -> 
     if free <= 0.0 {
         return usual;
     }
-    let prior = USUAL_COUNT * (-free / FORGOTTEN).exp();
+    let prior = USUAL_COUNT * exp(-free / FORGOTTEN);
     let middle = absolute.len() / 2;
     let median = *absolute.select_nth_unstable_by(middle, f64::total_cmp).1;
     // The factor for few residuals is that of P. J. Rousseeuw, A. M. Leroy, Robust regression (1987), chapter 5.
@@ -71,7 +73,7 @@ fn share_left(cut: f64) -> f64 {
     let mut sums = (0.0, 0.0);
     for node in 0..NODES {
         let x = (f64::from(node) + 0.5) / f64::from(NODES) * cut;
-        let density = (-0.5 * x * x).exp();
+        let density = exp(-0.5 * x * x);
         sums = (sums.0 + density, sums.1 + density * x * x);
     }
     sums.1 / sums.0

@@ -2,6 +2,7 @@
 
 use nalgebra::UnitQuaternion;
 
+use crate::algebra::vectors::exponential::{exp, ln};
 use crate::robust::conclude::depth_field::field::{
     DepthField, Equations, Field, PARAMETERS, Parameters, TERMS, Terms, precisions,
 };
@@ -82,7 +83,7 @@ impl DepthField {
                     let factor = regularised(&sums, &precisions)?;
                     let step = self.step(&sums, &precisions, &factor)?;
                     let next = Self::stepped(&self, &step).with_shares(&sums, &factor);
-                    let spread = (next.square_spread / self.square_spread).ln();
+                    let spread = ln(next.square_spread / self.square_spread);
                     gain =
                         0.5 * factor.l().tr_mul(&step).norm_squared() + 0.25 * sums.usual * spread * spread;
                     from = Some((std::mem::replace(&mut self, next), step, worth));
@@ -124,7 +125,7 @@ impl DepthField {
             by_length.fixed_rows_mut::<3>(3).copy_from(&(self.t_21 / square));
             let all = self.square_spread + self.field.norm_squared();
             let pull =
-                2.0 * self.surprise(precisions) - 0.5 * (all / USUAL_SPREAD.powi(2)).ln() / FACTOR.powi(2);
+                2.0 * self.surprise(precisions) - 0.5 * ln(all / USUAL_SPREAD.powi(2)) / FACTOR.powi(2);
             // A translation that is about its noise changes by less, or it would turn around.
             let variance = by_length.dot(&factor.solve(&by_length));
             gradient += by_length * (pull / (1.0 + pull.abs() * variance));
@@ -149,7 +150,7 @@ impl DepthField {
         if sums.usual > 0.0 {
             let taken = factor.solve(&sums.along).trace() * sums.share / sums.usual;
             let ratio = (sums.square_spread / self.square_spread + taken) / sums.usual;
-            let ratio = ratio.clamp(1.0 / MOST_CHANGE, MOST_CHANGE).powf(RELAXED);
+            let ratio = exp(RELAXED * ln(ratio.clamp(1.0 / MOST_CHANGE, MOST_CHANGE)));
             self.square_spread = (self.square_spread * ratio).max(LEAST_SPREAD);
             let near = (sums.near - FREE).max(0.0);
             self.near = (near / (sums.usual + near)).clamp(LEAST_NEAR, MOST_NEAR);
