@@ -128,7 +128,7 @@ fn no_pose(observations: &Observations, inliers: usize, false_share: f64) -> Est
     // Within a threshold as wide as the image all points are on a line.
     let some = observations.first(DIAGNOSED);
     let is_usual = false_share < options::UNUSUAL;
-    let otherwise = if observations.is_long_line(&some) || is_usual && observations.is_line(&some) {
+    let otherwise = if observations.is_line(&some) && (is_usual || observations.is_long(&some)) {
         InputError::Degenerate(Degeneracy::Collinear).into()
     } else {
         EstimateError::NoPose { inliers, matches: observations.given.len(), false_share }

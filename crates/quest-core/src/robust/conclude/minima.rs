@@ -56,7 +56,7 @@ pub(crate) fn likeliest(poses: &mut PoseScorer, best: Polished, found: &SearchRe
     others.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let likelihood = PoseLikelihood::new(poses.observations, &best);
     let mut known = vec![found.best.motion];
-    let mut of_search = None;
+    let (mut of_search, mut of_best) = (None, None);
     let mut likeliest: Option<(f64, Polished)> = None;
     for other in others {
         if known.len() > MOST || known.iter().any(|known| is_same_minimum(known, &other.motion)) {
@@ -68,7 +68,8 @@ pub(crate) fn likeliest(poses: &mut PoseScorer, best: Polished, found: &SearchRe
             continue;
         }
         let other = polish(poses, other.motion);
-        let least = likeliest.as_ref().map_or_else(|| likelihood.of(&best.pose) + BETTER, |(nats, _)| *nats);
+        let of_best = *of_best.get_or_insert_with(|| likelihood.of(&best.pose));
+        let least = likeliest.as_ref().map_or(of_best + BETTER, |(nats, _)| *nats);
         let nats = likelihood.of(&other.pose);
         if nats > least && explain_the_same(&best, &other) {
             likeliest = Some((nats, other));

@@ -162,7 +162,7 @@ fn refuse_line(
     if model == Model::PureRotation || !observations.is_line(&some) {
         return Ok(());
     }
-    if false_share >= UNUSUAL && !observations.is_long_line(&some) {
+    if false_share >= UNUSUAL && !observations.is_long(&some) {
         return Err(no_pose(observations, inliers.len(), false_share));
     }
     Err(degenerate(observations, InputError::Degenerate(Degeneracy::Collinear).into()))

@@ -80,9 +80,9 @@ impl<'a> Observations<'a> {
         nearly_on_a_line(some, self.thresholds())
     }
 
-    /// Whether some matches are spread along a line, which a threshold as wide as the image does not make them.
-    pub(crate) fn is_long_line(&self, some: &[Correspondence]) -> bool {
-        self.is_line(some) && are_spread_along(some, self.thresholds())
+    /// Whether the line of some matches is long, which a threshold as wide as the image does not make it.
+    pub(crate) fn is_long(&self, line: &[Correspondence]) -> bool {
+        are_spread_along(line, self.thresholds())
     }
 
     /// The threshold in both views, in radians.
