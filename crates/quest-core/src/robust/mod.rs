@@ -52,20 +52,16 @@ mod search;
 mod tests;
 mod third_view;
 
-use rand_chacha::ChaCha8Rng;
-
 pub use batch::{Batch, Problem, STACK_SIZE, estimate_batch};
 pub use estimate::{Estimate, Evidence, Model, RunnerUp};
 pub use options::{EstimateError, KnownDirection, Options, Priors};
 pub use third_view::{ThirdView, estimate_with_third_view};
 
 use crate::degeneracy::diagnose;
-use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, Degeneracy, InputError};
-use conclude::{Answer, false_alarms};
+use conclude::Answer;
 use data::observations::Observations;
 use pipeline::Task;
-use search::{Draws, Limits, Search, hypotheses};
 
 /// Fewer matches than this have no pose.
 pub const MIN_MATCHES: usize = 5;
@@ -142,35 +138,4 @@ fn degenerate(observations: &Observations, otherwise: EstimateError) -> Estimate
         Degeneracy::RankDeficient => otherwise,
         reason => InputError::Degenerate(reason).into(),
     }
-}
-
-/// Steps 1 and 2: the best pose that samples lead to.
-fn search<'a>(
-    observations: &'a Observations,
-    options: &Options,
-    priors: &Priors,
-    rng: ChaCha8Rng,
-    is_cancelled: &(dyn Fn() -> bool + Sync),
-) -> Search<'a> {
-    let mut search = Search::new(observations, options, priors.direction);
-    if let Some(pose) = priors.pose
-        && let Some(direction) = pose.t_21.try_normalize(0.0)
-    {
-        search.consider_pose(Motion { q_21: pose.q_21, direction });
-    }
-    let limits = Limits {
-        confidence: options.confidence,
-        min_iterations: options.min_iterations,
-        max_iterations: options.max_iterations,
-        is_cancelled,
-    };
-    let mut source = hypotheses::of_solver(options.solver, observations.len());
-    let size = options.solver.info().min_matches;
-    let draws = Draws { rng, size, given: priors.ranked(observations) };
-    let mut false_matches = None;
-    search.run(source.as_mut(), draws, &limits, &mut |pose, tries| {
-        let false_matches = false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
-        false_alarms::log_false_alarms(pose, tries, false_matches) > 0.0
-    });
-    search
 }

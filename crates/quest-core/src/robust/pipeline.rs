@@ -5,14 +5,15 @@ use nalgebra::Vector3;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Estimate, EstimateError, MIN_MATCHES, Options, Priors, RunnerUp, no_pose, search};
-use crate::robust::conclude::{self, Answer};
+use super::{Estimate, EstimateError, MIN_MATCHES, Options, Priors, RunnerUp, no_pose};
+use crate::robust::conclude::{self, Answer, false_alarms};
 use crate::robust::data::columns::Residuals;
 use crate::robust::data::keypoints::Keypoints;
 use crate::robust::data::observations::Observations;
+use crate::robust::search::crowds::{Crowds, explains_clearly_more};
 use crate::robust::search::pose_score::PoseScorer;
-use crate::robust::search::sampling;
 use crate::robust::search::search_score::REACH;
+use crate::robust::search::{Draws, IsChance, Limits, Search, SearchResult, hypotheses, sampling};
 use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, InputError, RelativePose};
 
@@ -21,6 +22,9 @@ const LEAST_UNMOVED: usize = 8;
 
 /// A bearing has not moved where it is the same to this: rounding.
 const UNMOVED: f64 = 1e-12;
+
+/// The confidence of the search beside a crowd, at most. With 0.9999 it takes twice as long, and as many planted scenes are right.
+const CONFIDENCE: f64 = 0.99;
 
 /// What an estimate is made of.
 pub(crate) struct Task<'a> {
@@ -84,8 +88,8 @@ impl Task<'_> {
             None => (order, None),
         };
         let observations = of(searched);
-        let (mut poses, found) =
-            search(&observations, options, priors, rng.clone(), is_cancelled).into_result();
+        let (mut poses, found) = self.search(&observations, &rng);
+        let found = found.map(|found| self.search_beside_crowds(&mut poses, found, &rng));
         if is_cancelled() {
             return Err(EstimateError::Cancelled);
         }
@@ -107,6 +111,84 @@ impl Task<'_> {
         keypoints.mark_copies(&mut found.inliers);
         found.inlier_count = found.inliers.iter().filter(|is| **is).count();
         Ok(found)
+    }
+
+    /// Steps 1 and 2: the best pose that samples lead to.
+    fn search<'b>(
+        &self,
+        observations: &'b Observations,
+        rng: &ChaCha8Rng,
+    ) -> (PoseScorer<'b>, Option<SearchResult>) {
+        let Self { options, priors, .. } = *self;
+        let mut search = Search::new(observations, options, priors.direction);
+        if let Some(pose) = priors.pose
+            && let Some(direction) = pose.t_21.try_normalize(0.0)
+        {
+            search.consider_pose(Motion { q_21: pose.q_21, direction });
+        }
+        let mut false_matches = None;
+        let is_chance = &mut |pose: &_, tries| {
+            let false_matches =
+                false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
+            false_alarms::log_false_alarms(pose, tries, false_matches) > 0.0
+        };
+        let limits = Limits {
+            confidence: options.confidence,
+            min_iterations: options.min_iterations,
+            max_iterations: options.max_iterations,
+            is_cancelled: self.is_cancelled,
+        };
+        self.draw(&mut search, observations, &limits, rng, is_chance);
+        search.into_result()
+    }
+
+    /// What was found, unless much of it is a crowd: then matches are left out until none crowd, and if another pose explains clearly
+    /// more of those that are left, it is that pose.
+    fn search_beside_crowds(
+        &self,
+        poses: &mut PoseScorer,
+        found: SearchResult,
+        rng: &ChaCha8Rng,
+    ) -> SearchResult {
+        let Self { matches, options, priors, .. } = *self;
+        let pose = poses.score(found.best.motion, options.threshold);
+        let crowds = Crowds::new(poses.observations).filter(|crowds| crowds.hold(&pose.inliers));
+        poses.recycle(pose);
+        let Some(crowds) = crowds else { return found };
+        let spread = Observations::new(matches, crowds.others, options.focal_lengths, options.threshold);
+        let mut search = Search::new(&spread, options, priors.direction);
+        search.know(found.best.motion);
+        // A pose is known, which no chance explained: none has to be found.
+        let limits = Limits {
+            confidence: options.confidence.min(CONFIDENCE),
+            min_iterations: 0,
+            max_iterations: options.max_iterations.saturating_sub(found.iterations),
+            is_cancelled: self.is_cancelled,
+        };
+        self.draw(&mut search, &spread, &limits, rng, &mut |_, _| false);
+        let (mut poses, Some(other)) = search.into_result() else { return found };
+        let [pose, known] = [&other, &found].map(|found| poses.score(found.best.motion, options.threshold));
+        let (iterations, tries) = (found.iterations + other.iterations, found.tries + other.tries);
+        if explains_clearly_more(&pose, &known) {
+            SearchResult { iterations, tries, ..other }
+        } else {
+            SearchResult { iterations, ..found }
+        }
+    }
+
+    fn draw(
+        &self,
+        search: &mut Search,
+        observations: &Observations,
+        limits: &Limits,
+        rng: &ChaCha8Rng,
+        is_chance: &mut IsChance,
+    ) {
+        let solver = self.options.solver;
+        let mut source = hypotheses::of_solver(solver, observations.len());
+        let size = solver.info().min_matches;
+        let draws = Draws { rng: rng.clone(), size, given: self.priors.ranked(observations) };
+        search.run(source.as_mut(), draws, limits, is_chance);
     }
 
     /// Whether a pose has most of the matches that did not move within the threshold.

@@ -84,14 +84,8 @@ fn is_same_minimum(a: &Motion, b: &Motion) -> bool {
 
 /// Whether most of the matches that one of the two explains are explained by the other.
 fn explain_the_same(a: &Polished, b: &Polished) -> bool {
-    let [a, b] = [&a.pose.inliers, &b.pose.inliers];
-    let mut rest = b.iter().peekable();
-    let mut both = 0;
-    for i in a {
-        while rest.next_if(|j| *j < i).is_some() {}
-        both += usize::from(rest.next_if_eq(&i).is_some());
-    }
-    both as f64 >= SHARED * a.len().max(b.len()) as f64
+    let (a, b) = (&a.pose, &b.pose);
+    a.inliers_in_common(b) as f64 >= SHARED * a.inliers.len().max(b.inliers.len()) as f64
 }
 
 /// The likelihood of a pose, in nats.

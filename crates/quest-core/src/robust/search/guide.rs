@@ -14,12 +14,16 @@
 //!    best pose, but at most [`MOST_DENSE`]; clean samples are as seldom useful as those of an unknown pose may be;
 //! 3. *it is not chance*, which the search asks before it stops.
 //!
+//! Where a pose is known beforehand, only a competitor matters that explains clearly more. Until one is found the first question is not
+//! asked.
+//!
 //! Where the order is of no use, no pool is denser than all matches are. The rules are then those of uniform samples, and at worst a
 //! quarter more samples are drawn than those would take.
 
 use rand_chacha::ChaCha8Rng;
 
 use crate::robust::search::chart::{Chart, part};
+use crate::robust::search::crowds::clearly_more_than;
 use crate::robust::search::pools::{LEAST, Pools};
 use crate::robust::search::ranking;
 use crate::robust::search::sampling::{Sample, draw_from, draw_uniform};
@@ -55,6 +59,8 @@ pub(crate) struct Guide {
     /// All samples, and those of them that were drawn from all matches.
     turn: usize,
     uniform: f64,
+    /// How many matches a pose explains that explains clearly more than the one which is known beforehand.
+    clearly_more: Option<f64>,
     best: Best,
 }
 
@@ -63,6 +69,10 @@ pub(crate) struct Guide {
 struct Best {
     is_inlier: Vec<bool>,
     inliers: usize,
+    /// Whether it explains no more than the pose that is known beforehand.
+    is_known: bool,
+    /// So many inliers of a competitor are among the matches that it leaves, at least.
+    apart: f64,
     /// One for samples from all matches, one for samples from pools, whose matches are nearer to each other.
     useful: [Useful; 2],
     /// What a sample of all matches adds for it, and for a competitor.
@@ -86,6 +96,7 @@ impl Guide {
             rest: None,
             turn: 0,
             uniform: 0.0,
+            clearly_more: None,
             best: Best::default(),
         }
     }
@@ -112,7 +123,15 @@ impl Guide {
 
     /// The inliers of a new best pose: what was known of the last one does not hold for it.
     pub(crate) fn set_best(&mut self, inliers: &[u32]) {
-        self.best = Best { is_inlier: vec![false; self.matches], inliers: inliers.len(), ..Best::default() };
+        let count = inliers.len();
+        let clearly_more = self.clearly_more.filter(|least| *least > count as f64);
+        self.best = Best {
+            is_inlier: vec![false; self.matches],
+            inliers: count,
+            is_known: clearly_more.is_some(),
+            apart: APART * clearly_more.unwrap_or(count as f64),
+            ..Best::default()
+        };
         for &i in inliers {
             self.best.is_inlier[i as usize] = true;
         }
@@ -120,6 +139,11 @@ impl Guide {
         if let Some(pools) = &mut self.pools {
             pools.count(&self.best.is_inlier);
         }
+    }
+
+    /// A pose with so many inliers is known beforehand: only another is looked for that explains clearly more.
+    pub(crate) fn set_known(&mut self, inliers: usize) {
+        self.clearly_more = Some(clearly_more_than(inliers as f64));
     }
 
     /// Whether a sample that came from a pool, or from all matches, tells how useful clean samples are.
@@ -164,7 +188,7 @@ impl Guide {
         let pools = self.pools.as_ref();
         let sum = self.uniform * self.best.gain + pools.map_or(0.0, Pools::sum);
         let missing = self.enough - sum;
-        if missing > 0.0 {
+        if missing > 0.0 && !self.best.is_known {
             self.best.is_found_again = false;
             return missing / pools.map_or(0.0, Pools::most).max(self.best.gain);
         }
@@ -186,11 +210,10 @@ impl Guide {
         let (n, inliers, sample) = (self.matches as f64, self.best.inliers as f64, self.sample);
         let [of_all, of_pools] = self.best.useful.map(|useful| useful.share());
         self.best.gain = gain(of_all * chance(inliers, n, sample));
-        let apart = APART * inliers;
-        let left = n - inliers;
+        let (apart, left) = (self.best.apart, n - inliers);
         // Infinite where the matches that are left are too few for another pose.
         self.best.gain_of_competitor =
-            if apart < left { gain(USEFUL * chance(inliers, n, sample)) } else { f64::INFINITY };
+            if apart < left { gain(USEFUL * chance(apart / APART, n, sample)) } else { f64::INFINITY };
         let Some(pools) = &mut self.pools else { return };
         pools.weigh(sample, of_pools);
         if let Some(rest) = &mut self.rest {

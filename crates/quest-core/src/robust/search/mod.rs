@@ -8,6 +8,7 @@
 
 mod chart;
 mod contenders;
+pub(crate) mod crowds;
 mod guide;
 pub(crate) mod hypotheses;
 mod pools;
@@ -156,6 +157,8 @@ pub(crate) struct Search<'a> {
     best_hypothesis: f64,
     /// The best pose.
     best: Option<Scored>,
+    /// A pose that was found before: only another that explains clearly more ends the search for one.
+    known: Option<Motion>,
     /// Every pose that was refined, and the hypotheses that might have been.
     refined: Vec<Scored>,
     contenders: Contenders,
@@ -182,6 +185,7 @@ impl<'a> Search<'a> {
             poses: PoseScorer::new(observations, loss),
             best_hypothesis: observations.len() as f64,
             best: None,
+            known: None,
             refined: Vec::new(),
             contenders: Contenders::default(),
             iterations: 0,
@@ -207,6 +211,11 @@ impl<'a> Search<'a> {
             return self.run_all(source, Exhaustive::new(matches, draws.size), limits);
         }
         let mut guide = Guide::new(draws.rng, matches, draws.size, limits.confidence);
+        if let Some(known) = self.known {
+            let pose = self.poses.score(known, SUPPORT * self.poses.threshold());
+            guide.set_known(pose.inliers.len());
+            self.poses.recycle(pose);
+        }
         let mut given = draws.given;
         // Scores guide from the first sample on.
         if given.is_some() && !guide.is_too_small() {
@@ -357,6 +366,12 @@ impl<'a> Search<'a> {
             self.refined.push(optimised);
             self.keep(optimised);
         }
+    }
+
+    /// Considers a pose that was found before, and looks only for another that explains clearly more.
+    pub(crate) fn know(&mut self, motion: Motion) {
+        self.known = Some(motion);
+        self.consider_pose(motion);
     }
 
     /// Refines the best of the other hypotheses: they may lead to other minima.

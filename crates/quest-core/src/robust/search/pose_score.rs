@@ -51,6 +51,16 @@ impl ScoredPose {
         self.inliers.iter().map(|&i| self.residuals.values[i as usize])
     }
 
+    /// How many matches are inliers of both poses.
+    pub(crate) fn inliers_in_common(&self, other: &Self) -> usize {
+        let mut rest = other.inliers.iter().peekable();
+        let is_in_rest = |i: &&u32| {
+            while rest.next_if(|j| j < i).is_some() {}
+            rest.next_if_eq(i).is_some()
+        };
+        self.inliers.iter().filter(is_in_rest).count()
+    }
+
     /// The sum of the squared residuals in units of the noise `sigma`, none above [`CAP`], which a point behind a camera
     /// counts as well.
     pub(crate) fn misfit(&self, sigma: f64) -> f64 {

@@ -1,0 +1,217 @@
+//! Crowds: matches that are near many others in both views.
+//!
+//! The score counts every match alike, as if each were false on its own. A thing that moves by itself is false with all of its matches
+//! at once. Where it is small and full of texture, its matches and some that agree by chance may be more than those of the scene. But
+//! matches in one place say nearly the same of a motion, and most of them can be left out without loss. Among the others that pose
+//! is the better one which explains more of the image, not more of one place.
+
+use std::f64::consts::PI;
+
+use crate::algebra::vectors::widest::{Simd, Work, widest};
+use crate::robust::data::observations::Observations;
+use crate::robust::search::chart::{Chart, chart};
+use crate::robust::search::pose_score::ScoredPose;
+use crate::robust::search::search_score::MANY;
+
+/// A neighbourhood is a circle of this share of the area that has matches.
+const PART: f64 = 0.005;
+
+/// Its radius in view 2 is so many times larger: a thing may come nearer.
+const NEARER: f64 = 1.5;
+
+/// A neighbourhood keeps at most so many times the matches that it had if all were evenly spread, or [`LEAST`].
+const TIMES: f64 = 2.0;
+const LEAST: f64 = 3.0;
+
+/// The first so many matches stand for all: they are in random order.
+const PROBES: usize = 256;
+
+/// This share of the matches in the middle of a coordinate says how far it reaches: a few may be anywhere.
+const MIDDLE: f64 = 0.9;
+
+/// A pose is asked about if fewer of its inliers than this share are left. Measured: with 0.85 the recorded pairs take a fifth longer, and
+/// as many planted scenes with a dense false motion are right.
+const LEFT: f64 = 0.75;
+
+/// A pose explains clearly more than another if the numbers of matches that only one of them explains differ by so many of the standard
+/// deviations that chance gives them.
+const CLEARLY: f64 = 2.0;
+
+/// Which matches crowd.
+#[derive(Debug)]
+pub(crate) struct Crowds {
+    /// The others, in their order.
+    pub(crate) others: Vec<u32>,
+    /// Whether a match is one of the others.
+    is_left: Vec<bool>,
+}
+
+impl Crowds {
+    /// Of a match and its neighbours the first are left. `None` where none crowd.
+    pub(crate) fn new(observations: &Observations) -> Option<Self> {
+        if observations.len() < MANY {
+            return None;
+        }
+        let is_left = is_left(&chart(observations));
+        let places = observations.order.iter().zip(&is_left);
+        let others: Vec<u32> = places.filter(|(_, is_left)| **is_left).map(|(i, _)| *i).collect();
+        (others.len() < observations.len()).then_some(Self { others, is_left })
+    }
+
+    /// Whether much of the inliers is a crowd.
+    pub(crate) fn hold(&self, inliers: &[u32]) -> bool {
+        let left = inliers.iter().filter(|i| self.is_left[**i as usize]).count();
+        (left as f64) < LEFT * inliers.len() as f64
+    }
+}
+
+/// Which of the matches are left where most of each crowd are left out.
+fn is_left(chart: &Chart) -> Vec<bool> {
+    let count = chart[0].len();
+    let most = (TIMES * PART * count as f64).max(LEAST);
+    let [square1, square2] = [0, 2].map(|k| PART * extent(&chart[k]) * extent(&chart[k + 1]) / PI);
+    let mut neighbours = vec![0; count];
+    #[expect(clippy::cast_possible_truncation, reason = "neighbours need no more digits")]
+    let squares = [square1 as f32, (NEARER * NEARER * square2) as f32];
+    widest(Neighbours { chart, squares, counts: &mut neighbours });
+    let is_left = |(place, neighbours): (usize, &u32)| {
+        let probes = place.min(PROBES) as f64;
+        place == 0 || f64::from(*neighbours) * (place as f64) < most * probes
+    };
+    neighbours.iter().enumerate().map(is_left).collect()
+}
+
+/// How far a coordinate would reach if the matches were evenly spread.
+fn extent(values: &[f32]) -> f64 {
+    let mut values = values.to_vec();
+    let mut at = |part: f64| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
+        let place = (part * (values.len() - 1) as f64) as usize;
+        f64::from(*values.select_nth_unstable_by(place, f32::total_cmp).1)
+    };
+    (at(0.5 + 0.5 * MIDDLE) - at(0.5 - 0.5 * MIDDLE)) / MIDDLE
+}
+
+/// Counts the neighbours of every match among those before it, or among the first [`PROBES`].
+struct Neighbours<'a> {
+    chart: &'a Chart,
+    /// The squares of the radii of a neighbourhood.
+    squares: [f32; 2],
+    counts: &'a mut [u32],
+}
+
+impl Work for Neighbours<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
+    fn run<S: Simd>(self, _: S) {
+        let Self { chart, squares: [square1, square2], counts } = self;
+        for (i, count) in counts.iter_mut().enumerate() {
+            let [u1, v1, u2, v2] = chart.each_ref().map(|column| column[i]);
+            let [x1, y1, x2, y2] = chart.each_ref().map(|column| &column[..i.min(PROBES)]);
+            for (((x1, y1), x2), y2) in x1.iter().zip(y1).zip(x2).zip(y2) {
+                let distance1 = (x1 - u1) * (x1 - u1) + (y1 - v1) * (y1 - v1);
+                let distance2 = (x2 - u2) * (x2 - u2) + (y2 - v2) * (y2 - v2);
+                *count += u32::from((distance1 < square1) & (distance2 < square2));
+            }
+        }
+    }
+}
+
+/// Whether a pose explains clearly more of the matches than another, and mostly others.
+pub(crate) fn explains_clearly_more(pose: &ScoredPose, other: &ScoredPose) -> bool {
+    let both = pose.inliers_in_common(other);
+    let [own, others] = [pose, other].map(|pose| pose.inliers.len() - both);
+    own > both && own as f64 > clearly_more_than(others as f64)
+}
+
+/// The least `m` with `m − n ≥ z √(m + n)`, `z` of [`CLEARLY`].
+pub(crate) fn clearly_more_than(n: f64) -> f64 {
+    let square = CLEARLY * CLEARLY;
+    n + 0.5 * (square + (square * (square + 8.0 * n)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robust::search::sampling::generator;
+    use rand::RngExt;
+
+    const SEED: u64 = 71;
+
+    /// Matches all over two images of a thousand pixels in random order, a share of them within a small square of each view.
+    fn chart(count: usize, crowd: f64, unit: f32) -> (Chart, Vec<bool>) {
+        let mut rng = generator(SEED, 0);
+        let mut is_crowd = Vec::new();
+        let mut chart = Chart::default();
+        for _ in 0..count {
+            let is_one = rng.random_bool(crowd);
+            is_crowd.push(is_one);
+            for column in &mut chart {
+                let x: f32 =
+                    if is_one { rng.random_range(400.0..500.0) } else { rng.random_range(0.0..1000.0) };
+                column.push(unit * x);
+            }
+        }
+        (chart, is_crowd)
+    }
+
+    /// How many of the crowd and of the others there are, and how many of them are left.
+    fn counts(chart: &Chart, is_crowd: &[bool]) -> [[usize; 2]; 2] {
+        let is_left = is_left(chart);
+        [true, false].map(|which| {
+            let of = is_left.iter().zip(is_crowd).filter(|(_, is)| **is == which);
+            [of.clone().count(), of.filter(|(is_left, _)| **is_left).count()]
+        })
+    }
+
+    #[test]
+    fn matches_all_about_do_not_crowd() {
+        for count in [10, 100, 1_000, 5_000] {
+            let (chart, _) = chart(count, 0.0, 1.0);
+            // Both points of a false match are anywhere: hardly two are near each other in both views.
+            assert!(is_left(&chart).iter().all(|is_left| *is_left), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_scene_that_moves_together_is_no_crowd() {
+        let (chart, _) = chart(1_000, 0.0, 1.0);
+        let [x, y, ..] = chart;
+        let moved = [x.clone(), y.clone(), x.iter().map(|x| x + 50.0).collect(), y];
+        let left = is_left(&moved).iter().filter(|is| **is).count();
+        assert!(left > 950, "{left}");
+    }
+
+    #[test]
+    fn few_of_a_crowd_are_left_and_all_others() {
+        for (count, part) in [(100, 2), (600, 4), (5_000, 4)] {
+            let (chart, is_crowd) = chart(count, 0.4, 1.0);
+            let [[crowd, left], [others, others_left]] = counts(&chart, &is_crowd);
+            assert!(part * left < crowd, "{left} of {crowd}");
+            assert_eq!(others_left, others);
+        }
+    }
+
+    #[test]
+    fn the_unit_does_not_matter_nor_one_match_far_away() {
+        let (mut chart, mut is_crowd) = chart(600, 0.4, 1.0);
+        let (other, _) = self::chart(600, 0.4, 128.0);
+        assert_eq!(is_left(&chart), is_left(&other));
+        for column in &mut chart {
+            column.push(1e6);
+        }
+        is_crowd.push(false);
+        let [[crowd, left], [others, others_left]] = counts(&chart, &is_crowd);
+        assert!(4 * left < crowd && others_left == others, "{left} of {crowd}");
+    }
+
+    #[test]
+    fn more_is_clearly_more_beyond_chance() {
+        for n in [0.0, 4.0, 100.0] {
+            let m = clearly_more_than(n);
+            assert!((m - n - 2.0 * (m + n).sqrt()).abs() < 1e-9, "{n}: {m}");
+        }
+    }
+}
