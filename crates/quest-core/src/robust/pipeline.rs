@@ -12,7 +12,7 @@ use crate::robust::data::keypoints::Keypoints;
 use crate::robust::data::observations::Observations;
 use crate::robust::search::crowds::{Crowds, explains_clearly_more};
 use crate::robust::search::pose_score::PoseScorer;
-use crate::robust::search::search_score::REACH;
+use crate::robust::search::search_score::{MANY, REACH};
 use crate::robust::search::{Draws, IsChance, Limits, Search, SearchResult, hypotheses, sampling};
 use crate::solver::shared::motion::Motion;
 use crate::{Correspondence, InputError, RelativePose};
@@ -151,11 +151,21 @@ impl Task<'_> {
         rng: &ChaCha8Rng,
     ) -> SearchResult {
         let Self { matches, options, priors, .. } = *self;
+        if poses.observations.len() < MANY {
+            return found;
+        }
+        let crowds = Crowds::new(poses.observations);
         let pose = poses.score(found.best.motion, options.threshold);
-        let crowds = Crowds::new(poses.observations).filter(|crowds| crowds.hold(&pose.inliers));
+        let is_crowd = crowds.hold(&pose.inliers);
         poses.recycle(pose);
-        let Some(crowds) = crowds else { return found };
-        let spread = Observations::new(matches, crowds.others, options.focal_lengths, options.threshold);
+        if !is_crowd {
+            return found;
+        }
+        let others = crowds.others(poses.observations);
+        if others.len() < MANY {
+            return found;
+        }
+        let spread = Observations::new(matches, others, options.focal_lengths, options.threshold);
         let mut search = Search::new(&spread, options, priors.direction);
         search.know(found.best.motion);
         // A pose is known, which no chance explained: none has to be found.

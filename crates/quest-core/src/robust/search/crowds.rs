@@ -11,7 +11,6 @@ use crate::algebra::vectors::widest::{Simd, Work, widest};
 use crate::robust::data::observations::Observations;
 use crate::robust::search::chart::{Chart, chart};
 use crate::robust::search::pose_score::ScoredPose;
-use crate::robust::search::search_score::MANY;
 
 /// A neighbourhood is a circle of this share of the area that has matches.
 const PART: f64 = 0.005;
@@ -24,12 +23,12 @@ const TIMES: f64 = 2.0;
 const LEAST: f64 = 3.0;
 
 /// The first so many matches stand for all: they are in random order.
-const PROBES: usize = 256;
+const PROBES: u32 = 256;
 
 /// This share of the matches in the middle of a coordinate says how far it reaches: a few may be anywhere.
 const MIDDLE: f64 = 0.9;
 
-/// A pose is asked about if fewer of its inliers than this share are left. Measured: with 0.85 the recorded pairs take a fifth longer, and
+/// Much of the inliers is a crowd if fewer than this share of them are left. Measured: with 0.85 the recorded pairs take a fifth longer, and
 /// as many planted scenes with a dense false motion are right.
 const LEFT: f64 = 0.75;
 
@@ -37,48 +36,58 @@ const LEFT: f64 = 0.75;
 /// deviations that chance gives them.
 const CLEARLY: f64 = 2.0;
 
-/// Which matches crowd.
+/// Inliers that are looked at for that.
+const ASKED: usize = 64;
+
+/// Neighbourhoods of matches in both views.
 #[derive(Debug)]
 pub(crate) struct Crowds {
-    /// The others, in their order.
-    pub(crate) others: Vec<u32>,
-    /// Whether a match is one of the others.
-    is_left: Vec<bool>,
+    chart: Chart,
+    /// The squares of the radii.
+    squares: [f32; 2],
+    /// How many matches a neighbourhood keeps.
+    most: f64,
 }
 
 impl Crowds {
-    /// Of a match and its neighbours the first are left. `None` where none crowd.
-    pub(crate) fn new(observations: &Observations) -> Option<Self> {
-        if observations.len() < MANY {
-            return None;
-        }
-        let is_left = is_left(&chart(observations));
-        let places = observations.order.iter().zip(&is_left);
-        let others: Vec<u32> = places.filter(|(_, is_left)| **is_left).map(|(i, _)| *i).collect();
-        (others.len() < observations.len()).then_some(Self { others, is_left })
+    pub(crate) fn new(observations: &Observations) -> Self {
+        Self::of_chart(chart(observations))
     }
 
-    /// Whether much of the inliers is a crowd.
+    fn of_chart(chart: Chart) -> Self {
+        let [square1, square2] = [0, 2].map(|k| PART * extent(&chart[k]) * extent(&chart[k + 1]) / PI);
+        #[expect(clippy::cast_possible_truncation, reason = "neighbours need no more digits")]
+        let squares = [square1 as f32, (NEARER * NEARER * square2) as f32];
+        let most = (TIMES * PART * chart[0].len() as f64).max(LEAST);
+        Self { chart, squares, most }
+    }
+
+    /// Whether much of the inliers of a pose is a crowd.
     pub(crate) fn hold(&self, inliers: &[u32]) -> bool {
-        let left = inliers.iter().filter(|i| self.is_left[**i as usize]).count();
-        (left as f64) < LEFT * inliers.len() as f64
+        let every = inliers.len().div_ceil(ASKED).max(1);
+        let asked: Vec<u32> = inliers.iter().step_by(every).copied().collect();
+        let left = self.are_left(&asked).iter().filter(|is_left| **is_left).count();
+        (left as f64) < LEFT * asked.len() as f64
     }
-}
 
-/// Which of the matches are left where most of each crowd are left out.
-fn is_left(chart: &Chart) -> Vec<bool> {
-    let count = chart[0].len();
-    let most = (TIMES * PART * count as f64).max(LEAST);
-    let [square1, square2] = [0, 2].map(|k| PART * extent(&chart[k]) * extent(&chart[k + 1]) / PI);
-    let mut neighbours = vec![0; count];
-    #[expect(clippy::cast_possible_truncation, reason = "neighbours need no more digits")]
-    let squares = [square1 as f32, (NEARER * NEARER * square2) as f32];
-    widest(Neighbours { chart, squares, counts: &mut neighbours });
-    let is_left = |(place, neighbours): (usize, &u32)| {
-        let probes = place.min(PROBES) as f64;
-        place == 0 || f64::from(*neighbours) * (place as f64) < most * probes
-    };
-    neighbours.iter().enumerate().map(is_left).collect()
+    /// The matches, in their order, of which none crowd.
+    pub(crate) fn others(&self, observations: &Observations) -> Vec<u32> {
+        let places: Vec<u32> = (0..).take(observations.len()).collect();
+        let are_left = self.are_left(&places);
+        let of_order = observations.order.iter().zip(are_left);
+        of_order.filter(|(_, is_left)| *is_left).map(|(i, _)| *i).collect()
+    }
+
+    /// Whether each of the matches at these places is left: of a match and its neighbours the first are.
+    fn are_left(&self, places: &[u32]) -> Vec<bool> {
+        let mut counts = vec![0; places.len()];
+        widest(Neighbours { chart: &self.chart, squares: self.squares, places, counts: &mut counts });
+        let is_left = |(&place, count): (&u32, u32)| {
+            let (place, probes) = (f64::from(place), f64::from(place.min(PROBES)));
+            place == 0.0 || f64::from(count) * place < self.most * probes
+        };
+        places.iter().zip(counts).map(is_left).collect()
+    }
 }
 
 /// How far a coordinate would reach if the matches were evenly spread.
@@ -92,11 +101,11 @@ fn extent(values: &[f32]) -> f64 {
     (at(0.5 + 0.5 * MIDDLE) - at(0.5 - 0.5 * MIDDLE)) / MIDDLE
 }
 
-/// Counts the neighbours of every match among those before it, or among the first [`PROBES`].
+/// Counts the neighbours of some matches among all before them, or among the first [`PROBES`].
 struct Neighbours<'a> {
     chart: &'a Chart,
-    /// The squares of the radii of a neighbourhood.
     squares: [f32; 2],
+    places: &'a [u32],
     counts: &'a mut [u32],
 }
 
@@ -106,10 +115,10 @@ impl Work for Neighbours<'_> {
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "lazy operators branch, which no vector can")]
     fn run<S: Simd>(self, _: S) {
-        let Self { chart, squares: [square1, square2], counts } = self;
-        for (i, count) in counts.iter_mut().enumerate() {
-            let [u1, v1, u2, v2] = chart.each_ref().map(|column| column[i]);
-            let [x1, y1, x2, y2] = chart.each_ref().map(|column| &column[..i.min(PROBES)]);
+        let Self { chart, squares: [square1, square2], places, counts } = self;
+        for (&place, count) in places.iter().zip(counts) {
+            let [u1, v1, u2, v2] = chart.each_ref().map(|column| column[place as usize]);
+            let [x1, y1, x2, y2] = chart.each_ref().map(|column| &column[..place.min(PROBES) as usize]);
             for (((x1, y1), x2), y2) in x1.iter().zip(y1).zip(x2).zip(y2) {
                 let distance1 = (x1 - u1) * (x1 - u1) + (y1 - v1) * (y1 - v1);
                 let distance2 = (x2 - u2) * (x2 - u2) + (y2 - v2) * (y2 - v2);
@@ -157,9 +166,14 @@ mod tests {
         (chart, is_crowd)
     }
 
+    fn are_left(chart: &Chart) -> Vec<bool> {
+        let places: Vec<u32> = (0..).take(chart[0].len()).collect();
+        Crowds::of_chart(chart.clone()).are_left(&places)
+    }
+
     /// How many of the crowd and of the others there are, and how many of them are left.
     fn counts(chart: &Chart, is_crowd: &[bool]) -> [[usize; 2]; 2] {
-        let is_left = is_left(chart);
+        let is_left = are_left(chart);
         [true, false].map(|which| {
             let of = is_left.iter().zip(is_crowd).filter(|(_, is)| **is == which);
             [of.clone().count(), of.filter(|(is_left, _)| **is_left).count()]
@@ -171,7 +185,7 @@ mod tests {
         for count in [10, 100, 1_000, 5_000] {
             let (chart, _) = chart(count, 0.0, 1.0);
             // Both points of a false match are anywhere: hardly two are near each other in both views.
-            assert!(is_left(&chart).iter().all(|is_left| *is_left), "{count}");
+            assert!(are_left(&chart).iter().all(|is_left| *is_left), "{count}");
         }
     }
 
@@ -180,7 +194,7 @@ mod tests {
         let (chart, _) = chart(1_000, 0.0, 1.0);
         let [x, y, ..] = chart;
         let moved = [x.clone(), y.clone(), x.iter().map(|x| x + 50.0).collect(), y];
-        let left = is_left(&moved).iter().filter(|is| **is).count();
+        let left = are_left(&moved).iter().filter(|is| **is).count();
         assert!(left > 950, "{left}");
     }
 
@@ -198,7 +212,7 @@ mod tests {
     fn the_unit_does_not_matter_nor_one_match_far_away() {
         let (mut chart, mut is_crowd) = chart(600, 0.4, 1.0);
         let (other, _) = self::chart(600, 0.4, 128.0);
-        assert_eq!(is_left(&chart), is_left(&other));
+        assert_eq!(are_left(&chart), are_left(&other));
         for column in &mut chart {
             column.push(1e6);
         }
