@@ -132,13 +132,7 @@ impl Task<'_> {
                 false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
             false_alarms::log_false_alarms(pose, tries, false_matches) > 0.0
         };
-        let limits = Limits {
-            confidence: options.confidence,
-            min_iterations: options.min_iterations,
-            max_iterations: options.max_iterations,
-            is_cancelled: self.is_cancelled,
-        };
-        self.draw(&mut search, observations, &limits, rng, is_chance);
+        self.draw(&mut search, observations, &self.limits(), rng, is_chance);
         search.into_result()
     }
 
@@ -173,7 +167,7 @@ impl Task<'_> {
             confidence: options.confidence.min(CONFIDENCE),
             min_iterations: 0,
             max_iterations: options.max_iterations.saturating_sub(found.iterations),
-            is_cancelled: self.is_cancelled,
+            ..self.limits()
         };
         self.draw(&mut search, &spread, &limits, rng, &mut |_, _| false);
         let (mut poses, Some(other)) = search.into_result() else { return found };
@@ -184,6 +178,11 @@ impl Task<'_> {
         } else {
             SearchResult { iterations, ..found }
         }
+    }
+
+    fn limits(&self) -> Limits<'_> {
+        let Options { confidence, min_iterations, max_iterations, .. } = *self.options;
+        Limits { confidence, min_iterations, max_iterations, is_cancelled: self.is_cancelled }
     }
 
     fn draw(

@@ -32,12 +32,12 @@ const MIDDLE: f64 = 0.9;
 /// as many planted scenes with a dense false motion are right.
 const LEFT: f64 = 0.75;
 
+/// Inliers that are looked at for that.
+const ASKED: usize = 64;
+
 /// A pose explains clearly more than another if the numbers of matches that only one of them explains differ by so many of the standard
 /// deviations that chance gives them.
 const CLEARLY: f64 = 2.0;
-
-/// Inliers that are looked at for that.
-const ASKED: usize = 64;
 
 /// Neighbourhoods of matches in both views.
 #[derive(Debug)]
