@@ -209,6 +209,22 @@ mod tests {
     }
 
     #[test]
+    fn a_crowd_holds_inliers_of_which_a_quarter_would_be_left_out() {
+        let (chart, is_crowd) = chart(600, 0.4, 1.0);
+        let of =
+            |which| (0_u32..).zip(&is_crowd).filter(move |(_, is)| **is == which).map(|(place, _)| place);
+        let crowds = Crowds::of_chart(chart);
+        let mixed = |crowd, others| {
+            let mut inliers: Vec<u32> = of(true).take(crowd).chain(of(false).take(others)).collect();
+            inliers.sort_unstable();
+            inliers
+        };
+        assert!(crowds.hold(&mixed(200, 0)) && crowds.hold(&mixed(200, 200)));
+        assert!(!crowds.hold(&mixed(0, 200)) && !crowds.hold(&mixed(40, 200)));
+        assert!(!crowds.hold(&[]));
+    }
+
+    #[test]
     fn the_unit_does_not_matter_nor_one_match_far_away() {
         let (mut chart, mut is_crowd) = chart(600, 0.4, 1.0);
         let (other, _) = self::chart(600, 0.4, 128.0);
