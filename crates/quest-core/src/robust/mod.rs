@@ -22,6 +22,8 @@
 //!    than the best (`search::search_score`); the best are scored as poses, with the depths of their points
 //!    (`search::pose_score`), and refined over their inliers, until the best would have been found again, and any other as
 //!    good (`search::guide`, `search::stopping`). A few that are nearly as good are refined too (`search::contenders`).
+//!    Where many inliers of the best are in one place, another is looked for that explains clearly more of the rest of the image
+//!    (`search::crowds`).
 //! 3. The best pose is refined over all of its inliers with the noise that they show (`conclude::final_refinement`, `refine`), and
 //!    gives way to another minimum that explains the same matches and is likelier (`conclude::minima`).
 //! 4. A plane is fitted to its points, and the two motions of the plane tried as well (`conclude::plane`). The best is refined once
