@@ -132,7 +132,7 @@ impl Task<'_> {
                 false_matches.get_or_insert_with(|| false_alarms::false_matches(observations));
             false_alarms::log_false_alarms(pose, tries, false_matches) > 0.0
         };
-        self.draw(&mut search, observations, &self.limits(), rng, is_chance);
+        self.draw(&mut search, &self.limits(), rng, is_chance);
         search.into_result()
     }
 
@@ -162,14 +162,14 @@ impl Task<'_> {
         let spread = Observations::new(matches, others, options.focal_lengths, options.threshold);
         let mut search = Search::new(&spread, options, priors.direction);
         search.know(found.best.motion);
-        // A pose is known, which no chance explained: none has to be found.
+        // There is a pose already: no sample has to be drawn, and chance is asked once the best is known.
         let limits = Limits {
             confidence: options.confidence.min(CONFIDENCE),
             min_iterations: 0,
             max_iterations: options.max_iterations.saturating_sub(found.iterations),
             ..self.limits()
         };
-        self.draw(&mut search, &spread, &limits, rng, &mut |_, _| false);
+        self.draw(&mut search, &limits, rng, &mut |_, _| false);
         let (mut poses, Some(other)) = search.into_result() else { return found };
         let [pose, known] = [&other, &found].map(|found| poses.score(found.best.motion, options.threshold));
         let (iterations, tries) = (found.iterations + other.iterations, found.tries + other.tries);
@@ -180,23 +180,18 @@ impl Task<'_> {
         }
     }
 
+    /// The limits of the search that the options set.
     fn limits(&self) -> Limits<'_> {
         let Options { confidence, min_iterations, max_iterations, .. } = *self.options;
         Limits { confidence, min_iterations, max_iterations, is_cancelled: self.is_cancelled }
     }
 
-    fn draw(
-        &self,
-        search: &mut Search,
-        observations: &Observations,
-        limits: &Limits,
-        rng: &ChaCha8Rng,
-        is_chance: &mut IsChance,
-    ) {
+    /// Draws samples of the matches of a search.
+    fn draw(&self, search: &mut Search, limits: &Limits, rng: &ChaCha8Rng, is_chance: &mut IsChance) {
         let solver = self.options.solver;
-        let mut source = hypotheses::of_solver(solver, observations.len());
+        let mut source = hypotheses::of_solver(solver, search.observations.len());
         let size = solver.info().min_matches;
-        let draws = Draws { rng: rng.clone(), size, given: self.priors.ranked(observations) };
+        let draws = Draws { rng: rng.clone(), size, given: self.priors.ranked(search.observations) };
         search.run(source.as_mut(), draws, limits, is_chance);
     }
 

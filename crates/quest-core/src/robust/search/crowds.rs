@@ -18,7 +18,7 @@ const PART: f64 = 0.005;
 /// Its radius in view 2 is so many times larger: a thing may come nearer.
 const NEARER: f64 = 1.5;
 
-/// A neighbourhood keeps at most so many times the matches that it had if all were evenly spread, or [`LEAST`].
+/// A neighbourhood keeps at most so many times the matches that it would have if all were evenly spread, or [`LEAST`].
 const TIMES: f64 = 2.0;
 const LEAST: f64 = 3.0;
 
@@ -28,7 +28,7 @@ const PROBES: u32 = 256;
 /// This share of the matches in the middle of a coordinate says how far it reaches: a few may be anywhere.
 const MIDDLE: f64 = 0.9;
 
-/// Much of the inliers is a crowd if fewer than this share of them are left. Measured: with 0.85 the recorded pairs take a fifth longer, and
+/// Much of the inliers is a crowd if fewer than this share of them are left. Measured: with 0.85 the recorded pairs take a sixth longer, and
 /// as many planted scenes with a dense false motion are right.
 const LEFT: f64 = 0.75;
 

@@ -149,7 +149,7 @@ impl Round {
 /// The search for the best pose.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
-    observations: &'a Observations<'a>,
+    pub(crate) observations: &'a Observations<'a>,
     direction: Option<KnownDirection>,
     scorer: Scorer<'a>,
     poses: PoseScorer<'a>,
@@ -157,7 +157,7 @@ pub(crate) struct Search<'a> {
     best_hypothesis: f64,
     /// The best pose.
     best: Option<Scored>,
-    /// A pose that was found before: only another that explains clearly more ends the search for one.
+    /// A pose that was found before: the search is for another that explains clearly more.
     known: Option<Motion>,
     /// Every pose that was refined, and the hypotheses that might have been.
     refined: Vec<Scored>,
